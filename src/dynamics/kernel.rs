@@ -1,0 +1,426 @@
+//! The recursions themselves, written once for all pack widths.
+//!
+//! Everything is in **body axes** and the base accelerates by `−g`. For body `B` on parent `P`
+//! with `R = R_PB(q)`, `p = p_PB_P`, axis `a` (revolute):
+//!
+//! ```text
+//! ω_B = Rᵀω_P + a q̇            α_B = Rᵀα_P + (Rᵀω_P) × a q̇ + a q̈
+//! a_B = Rᵀ(a_P + α_P × p + ω_P × (ω_P × p))
+//! f_B = m a_B + α_B × h + ω_B × (ω_B × h)
+//! n_B = h × a_B + I α_B + ω_B × I ω_B
+//! ```
+//!
+//! (Newton-Euler about the body origin; Featherstone 2008, ch. 5; Atkeson, An & Hollerbach 1986.)
+//!
+//! **Regressor.** The generalised force of coordinate `i` due to body `j` is the power of that
+//! wrench on the motion `(v_ij, w_ij)` that a unit rate of `i` gives to the frame of `j`:
+//! `Y_ij φ_j = v_ij·f_j + w_ij·n_j`, linear in the ten parameters of `j`.
+//!
+//! **Adjoint.** For given parameters `φ` and rates `r` the scalar `F = Σ_i r_i τ_i` equals
+//! `Σ_j (v_j·f_j + w_j·n_j)` with `(v_j, w_j)` the motion that the rates `r` give. One sweep up
+//! and one down return `∂F/∂q, ∂F/∂q̇, ∂F/∂q̈` in `O(n)`, for the price of about four inverse
+//! dynamics: the reverse mode of the recursion above.
+
+use super::lanes::*;
+use super::tree::Tree;
+use crate::robot::Motion;
+
+/// Kinematics of one body for one pack of samples.
+#[derive(Clone, Copy)]
+pub(crate) struct Frame<L> {
+    /// `R_PB`
+    r: M3<L>,
+    /// `p_PB_P`
+    p: V3<L>,
+    omega: V3<L>,
+    alpha: V3<L>,
+    acc: V3<L>,
+    qd: L,
+}
+
+/// Wrench, virtual motion and adjoints of one body.
+#[derive(Clone, Copy)]
+pub(crate) struct Flow<L> {
+    /// accumulated force and moment of the subtree
+    f: V3<L>,
+    n: V3<L>,
+    v: V3<L>,
+    w: V3<L>,
+    acc: V3<L>,
+    alpha: V3<L>,
+    omega: V3<L>,
+}
+
+/// Scratch memory of one thread; grows once and is then reused.
+#[derive(Clone)]
+pub(crate) struct Scratch<L> {
+    frames: Vec<Frame<L>>,
+    flows: Vec<Flow<L>>,
+    twists: Vec<(V3<L>, V3<L>)>,
+}
+
+impl<L> Default for Scratch<L> {
+    fn default() -> Self {
+        Scratch { frames: Vec::new(), flows: Vec::new(), twists: Vec::new() }
+    }
+}
+
+/// Pointers to one pack of a motion stored joint by joint: `q + j·stride`.
+#[derive(Clone, Copy)]
+pub(crate) struct Pack {
+    pub q: *const f64,
+    pub qd: *const f64,
+    pub qdd: *const f64,
+    /// distance between joints
+    pub stride: usize,
+}
+
+/// Fills `scratch.frames`.
+///
+/// # Safety
+/// `pack` must point to `tree.dof()` joints of `L::WIDTH` samples.
+#[inline(always)]
+unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
+    s.frames.clear();
+    let g = splat3::<L>(&tree.gravity);
+    for node in &tree.nodes {
+        // SAFETY: by the caller's promise
+        let (q, qd, qdd) = unsafe {
+            let k = node.coordinate * pack.stride;
+            (L::load(pack.q.add(k)), L::load(pack.qd.add(k)), L::load(pack.qdd.add(k)))
+        };
+        let (q, qd, qdd) = (q * node.ratio + L::splat(node.offset), qd * node.ratio, qdd * node.ratio);
+        let a = splat3::<L>(&node.axis);
+        let mut p = splat3::<L>(&node.position);
+        let r: M3<L> = match node.motion {
+            Motion::Revolute => {
+                let (sin, cos) = sin_cos(q);
+                std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        sin * node.rs[i][j] + cos * node.rc[i][j] + L::splat(node.r0[i][j])
+                    })
+                })
+            }
+            Motion::Prismatic => {
+                p = add(p, scale(splat3(&node.slide), q));
+                std::array::from_fn(|i| splat3(&node.r0[i]))
+            }
+        };
+        let (omega, alpha, acc) = match node.parent {
+            Some(parent) => {
+                let b = &s.frames[parent];
+                let lever = add(cross(b.alpha, p), cross(b.omega, cross(b.omega, p)));
+                (mul_t(&r, b.omega), mul_t(&r, b.alpha), mul_t(&r, add(b.acc, lever)))
+            }
+            None => (zero(), zero(), mul_t(&r, [-g[0], -g[1], -g[2]])),
+        };
+        let (omega, alpha, acc) = match node.motion {
+            Motion::Revolute => (
+                add(omega, scale(a, qd)),
+                add(alpha, add(scale(cross(omega, a), qd), scale(a, qdd))),
+                acc,
+            ),
+            Motion::Prismatic => {
+                (omega, alpha, add(acc, add(scale(a, qdd), scale(cross(omega, a), qd + qd))))
+            }
+        };
+        s.frames.push(Frame { r, p, omega, alpha, acc, qd });
+    }
+}
+
+/// Where a kernel writes the regressor: column `c`, coordinate `j`, sample `i` at
+/// `base + c·column + j·row + i`.
+#[derive(Clone, Copy)]
+pub(crate) struct Sink {
+    pub base: *mut f64,
+    pub column: usize,
+    pub row: usize,
+}
+
+/// Writes the ten columns of every body for one pack; blocks that are zero by structure are not
+/// touched.
+///
+/// # Safety
+/// `pack` as in [`kinematics`]; `sink` must cover `10·bodies` columns and `dof` rows of
+/// `L::WIDTH` samples, and hold zeros where mimic joints accumulate.
+#[inline(always)]
+pub(crate) unsafe fn regressor<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>, sink: Sink) {
+    // SAFETY: by the caller's promise
+    unsafe { kinematics(tree, pack, s) };
+    let Scratch { frames, twists, .. } = s;
+    twists.resize(tree.twist_start[tree.nodes.len()], (zero(), zero()));
+    for (j, chain) in tree.chains.iter().enumerate() {
+        let Frame { omega: o, alpha: al, acc: a, .. } = frames[j];
+        // D = skew(α) + skew(ω)²
+        let (xy, xz, yz) = (o[0] * o[1], o[0] * o[2], o[1] * o[2]);
+        let (xx, yy, zz) = (o[0] * o[0], o[1] * o[1], o[2] * o[2]);
+        let d: M3<L> = [
+            [-(yy + zz), xy - al[2], xz + al[1]],
+            [xy + al[2], -(xx + zz), yz - al[0]],
+            [xz - al[1], yz + al[0], -(xx + yy)],
+        ];
+        let first = tree.twist_start[j];
+        let last = chain.len() - 1;
+        if let Some(parent) = tree.nodes[j].parent {
+            let from = tree.twist_start[parent];
+            let Frame { r, p, .. } = frames[j];
+            for k in 0..last {
+                let (v, w) = twists[from + k];
+                twists[first + k] = (mul_t(&r, add(v, cross(w, p))), mul_t(&r, w));
+            }
+        }
+        let axis = splat3::<L>(&tree.nodes[j].axis);
+        twists[first + last] = match tree.nodes[j].motion {
+            Motion::Revolute => (zero(), axis),
+            Motion::Prismatic => (axis, zero()),
+        };
+        for (k, &i) in chain.iter().enumerate() {
+            let (v, w) = twists[first + k];
+            let vd = mul_t(&d, v);
+            let aw = cross(a, w);
+            let u = cross(w, o);
+            let y = [
+                dot(v, a),
+                vd[0] + aw[0],
+                vd[1] + aw[1],
+                vd[2] + aw[2],
+                w[0] * al[0] + u[0] * o[0],
+                w[0] * al[1] + w[1] * al[0] + u[0] * o[1] + u[1] * o[0],
+                w[0] * al[2] + w[2] * al[0] + u[0] * o[2] + u[2] * o[0],
+                w[1] * al[1] + u[1] * o[1],
+                w[1] * al[2] + w[2] * al[1] + u[1] * o[2] + u[2] * o[1],
+                w[2] * al[2] + u[2] * o[2],
+            ];
+            let node = &tree.nodes[i];
+            // SAFETY: by the caller's promise
+            unsafe {
+                let at = sink.base.add(10 * j * sink.column + node.coordinate * sink.row);
+                if tree.shared {
+                    for (c, y) in y.into_iter().enumerate() {
+                        let at = at.add(c * sink.column);
+                        (L::load(at) + y * node.ratio).store(at);
+                    }
+                } else {
+                    for (c, y) in y.into_iter().enumerate() {
+                        y.store(at.add(c * sink.column));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Inertial parameters as the wrench needs them.
+#[derive(Clone, Copy)]
+struct Params {
+    m: f64,
+    h: [f64; 3],
+    i: [f64; 6],
+}
+
+#[inline(always)]
+fn params(phi: &[f64], body: usize) -> Params {
+    let p = &phi[10 * body..10 * body + 10];
+    Params { m: p[0], h: [p[1], p[2], p[3]], i: [p[4], p[5], p[6], p[7], p[8], p[9]] }
+}
+
+/// Wrench of every body and, accumulated, of its subtree.
+#[inline(always)]
+fn wrenches<L: Lanes>(tree: &Tree, phi: &[f64], s: &mut Scratch<L>) {
+    let Scratch { frames, flows, .. } = s;
+    flows.clear();
+    for (j, b) in frames.iter().enumerate() {
+        let p = params(phi, j);
+        let h = splat3::<L>(&p.h);
+        let f = add(
+            scale(b.acc, L::splat(p.m)),
+            add(cross(b.alpha, h), cross(b.omega, cross(b.omega, h))),
+        );
+        let n = add(
+            cross(h, b.acc),
+            add(sym_mul(&p.i, b.alpha), cross(b.omega, sym_mul(&p.i, b.omega))),
+        );
+        let z = zero();
+        flows.push(Flow { f, n, v: z, w: z, acc: z, alpha: z, omega: z });
+    }
+    for j in (0..frames.len()).rev() {
+        if let Some(parent) = tree.nodes[j].parent {
+            let Flow { f, n, .. } = flows[j];
+            let Frame { r, p, .. } = frames[j];
+            let force = mul(&r, f);
+            let moment = add(mul(&r, n), cross(p, force));
+            flows[parent].f = add(flows[parent].f, force);
+            flows[parent].n = add(flows[parent].n, moment);
+        }
+    }
+}
+
+/// Inverse dynamics of the rigid bodies for one pack: `τ = Y φ`, coordinate `j` at `tau + j·row`.
+///
+/// # Safety
+/// `pack` as in [`kinematics`]; `tau` must cover `dof` rows of `L::WIDTH` samples; `phi` must
+/// hold at least ten numbers a body.
+#[inline(always)]
+pub(crate) unsafe fn inverse_dynamics<L: Lanes>(
+    tree: &Tree,
+    phi: &[f64],
+    pack: Pack,
+    s: &mut Scratch<L>,
+    tau: *mut f64,
+    row: usize,
+) {
+    // SAFETY: by the caller's promise
+    unsafe {
+        kinematics(tree, pack, s);
+        wrenches(tree, phi, s);
+        for j in 0..tree.dof {
+            L::splat(0.0).store(tau.add(j * row));
+        }
+        for (node, flow) in tree.nodes.iter().zip(&s.flows) {
+            let a = splat3::<L>(&node.axis);
+            let t = match node.motion {
+                Motion::Revolute => dot(a, flow.n),
+                Motion::Prismatic => dot(a, flow.f),
+            };
+            let at = tau.add(node.coordinate * row);
+            (L::load(at) + t * node.ratio).store(at);
+        }
+    }
+}
+
+/// Outputs of [`adjoint`] for one parameter vector and one pack.
+#[derive(Clone, Copy)]
+pub(crate) struct Gradients {
+    pub q: *mut f64,
+    pub qd: *mut f64,
+    pub qdd: *mut f64,
+    pub row: usize,
+}
+
+/// Adds `Σ_j r_j ∂τ_j/∂(q, q̇, q̈)` to `out`, for rates `r` at `rates + j·rates_row`.
+///
+/// # Safety
+/// As [`gradients`]; the scratch must hold the kinematics, and the wrenches of `phi`.
+#[inline(always)]
+unsafe fn adjoint<L: Lanes>(
+    tree: &Tree,
+    phi: &[f64],
+    s: &mut Scratch<L>,
+    rates: *const f64,
+    rates_row: usize,
+    out: Gradients,
+) {
+    let Scratch { frames, flows, .. } = s;
+    // upwards: the motion that the rates give, and what each body's own power depends on
+    for j in 0..frames.len() {
+        let node = &tree.nodes[j];
+        let Frame { r, p, omega: o, .. } = frames[j];
+        let (mut v, mut w) = match node.parent {
+            Some(parent) => {
+                let Flow { v, w, .. } = flows[parent];
+                (mul_t(&r, add(v, cross(w, p))), mul_t(&r, w))
+            }
+            None => (zero(), zero()),
+        };
+        // SAFETY: by the caller's promise
+        let rate = unsafe { L::load(rates.add(node.coordinate * rates_row)) } * node.ratio;
+        let a = scale(splat3::<L>(&node.axis), rate);
+        match node.motion {
+            Motion::Revolute => w = add(w, a),
+            Motion::Prismatic => v = add(v, a),
+        }
+        let pr = params(phi, j);
+        let h = splat3::<L>(&pr.h);
+        let flow = &mut flows[j];
+        flow.v = v;
+        flow.w = w;
+        flow.acc = add(scale(v, L::splat(pr.m)), cross(w, h));
+        flow.alpha = add(cross(h, v), sym_mul(&pr.i, w));
+        flow.omega = add(
+            add(cross(cross(o, h), v), cross(h, cross(v, o))),
+            add(cross(sym_mul(&pr.i, o), w), sym_mul(&pr.i, cross(w, o))),
+        );
+    }
+    // downwards: adjoints of acceleration and velocity; those of (v, w) are the wrenches
+    for j in (0..frames.len()).rev() {
+        let node = &tree.nodes[j];
+        let b = frames[j];
+        let fl = flows[j];
+        let a = splat3::<L>(&node.axis);
+        let wa = cross(b.omega, a);
+        let (dq, dqd, dqdd, omega);
+        match node.motion {
+            Motion::Revolute => {
+                omega = add(fl.omega, scale(cross(a, fl.alpha), b.qd));
+                let twist = add(
+                    add(cross(omega, b.omega), cross(fl.alpha, sub(b.alpha, scale(wa, b.qd)))),
+                    add(cross(fl.acc, b.acc), add(cross(fl.n, fl.w), cross(fl.f, fl.v))),
+                );
+                dq = dot(a, twist);
+                dqd = dot(a, fl.omega) + dot(fl.alpha, wa);
+                dqdd = dot(a, fl.alpha);
+            }
+            Motion::Prismatic => {
+                omega = add(fl.omega, scale(cross(a, fl.acc), b.qd + b.qd));
+                dq = dot(fl.acc, add(cross(b.alpha, a), cross(b.omega, wa)))
+                    + dot(fl.f, cross(fl.w, a));
+                dqd = dot(fl.acc, wa) * 2.0;
+                dqdd = dot(a, fl.acc);
+            }
+        }
+        // SAFETY: by the caller's promise
+        unsafe {
+            for (value, at) in [(dq, out.q), (dqd, out.qd), (dqdd, out.qdd)] {
+                let at = at.add(node.coordinate * out.row);
+                (L::load(at) + value * node.ratio).store(at);
+            }
+        }
+        if let Some(parent) = node.parent {
+            let Frame { r, p, .. } = b;
+            let o = frames[parent].omega;
+            let g = mul(&r, fl.acc);
+            let up = &mut flows[parent];
+            up.acc = add(up.acc, g);
+            up.alpha = add(up.alpha, add(mul(&r, fl.alpha), cross(p, g)));
+            let lever = add(cross(cross(o, p), g), cross(p, cross(g, o)));
+            up.omega = add(up.omega, add(mul(&r, omega), lever));
+        }
+    }
+}
+
+/// Kinematics once, then for each of several parameter vectors `φ_k` with rates `r_k` the
+/// gradient of `Σ_j r_kj τ_j(q, q̇, q̈; φ_k)`, added to `out`.
+///
+/// `parameters` holds the vectors one after another, `each` numbers apart; `rates` and `out` of
+/// vector `k` are `k·step` further, coordinate `j` at `j·out.row`.
+///
+/// # Safety
+/// `pack` as in [`kinematics`]; `rates` and the three arrays of `out` must cover
+/// `parameters.len()/each` blocks of `dof` rows of `L::WIDTH` samples.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub(crate) unsafe fn gradients<L: Lanes>(
+    tree: &Tree,
+    parameters: &[f64],
+    each: usize,
+    pack: Pack,
+    s: &mut Scratch<L>,
+    rates: *const f64,
+    out: Gradients,
+    step: usize,
+) {
+    // SAFETY: by the caller's promise
+    unsafe {
+        kinematics(tree, pack, s);
+        for (k, phi) in parameters.chunks_exact(each).enumerate() {
+            wrenches(tree, phi, s);
+            let out = Gradients {
+                q: out.q.add(k * step),
+                qd: out.qd.add(k * step),
+                qdd: out.qdd.add(k * step),
+                row: out.row,
+            };
+            adjoint(tree, phi, s, rates.add(k * step), out.row, out);
+        }
+    }
+}

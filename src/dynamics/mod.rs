@@ -1,0 +1,359 @@
+//! Inverse dynamics, the regressor and their exact derivatives, over batches of samples.
+//!
+//! A [`Tree`] is the immutable model, a [`Workspace`] the memory of one thread, a [`Motion`]
+//! (positions, velocities, accelerations of many samples, joint by joint) the input. Every
+//! function writes into memory that the caller owns and allocates nothing once the workspace has
+//! grown to its size; several threads may share one [`Tree`].
+//!
+//! ```
+//! use excite::dynamics::{Samples, Tree, Workspace};
+//! let robot = excite::Robot::load("planar2")?;
+//! let tree = Tree::new(&robot);
+//! let motion = Samples::from_rows(2, &[[0.3, -0.5]], &[[1.0, 0.2]], &[[0.0, 3.0]]);
+//! let mut tau = vec![0.0; 2];
+//! tree.inverse_dynamics(&mut Workspace::default(), &robot.parameters(), &motion, &mut tau);
+//! # assert!(tau.iter().all(|t| t.is_finite()));
+//! # Ok::<(), excite::Error>(())
+//! ```
+
+mod kernel;
+pub mod lanes;
+mod tree;
+
+pub use lanes::Isa;
+pub use tree::Tree;
+
+use kernel::{Gradients, Pack, Scratch, Sink};
+use lanes::{Lanes, Portable4};
+
+/// A sampled motion of all coordinates, joint by joint: joint `j` at sample `i` is
+/// `q[j * count + i]`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Samples {
+    /// number of coordinates
+    pub dof: usize,
+    /// number of samples
+    pub count: usize,
+    /// positions, rad or m
+    pub q: Vec<f64>,
+    /// velocities
+    pub qd: Vec<f64>,
+    /// accelerations
+    pub qdd: Vec<f64>,
+}
+
+impl Samples {
+    /// A motion at rest in zero, to be filled.
+    pub fn zeros(dof: usize, count: usize) -> Self {
+        let z = vec![0.0; dof * count];
+        Samples { dof, count, q: z.clone(), qd: z.clone(), qdd: z }
+    }
+
+    /// From one row a sample.
+    ///
+    /// # Panics
+    /// If a row has not `dof` entries, or the three lists differ in length.
+    pub fn from_rows<R: AsRef<[f64]>>(dof: usize, q: &[R], qd: &[R], qdd: &[R]) -> Self {
+        assert!(q.len() == qd.len() && q.len() == qdd.len(), "as many positions as derivatives");
+        let mut s = Samples::zeros(dof, q.len());
+        for i in 0..q.len() {
+            for (to, from) in [(&mut s.q, &q[i]), (&mut s.qd, &qd[i]), (&mut s.qdd, &qdd[i])] {
+                assert_eq!(from.as_ref().len(), dof, "one entry for each coordinate");
+                for (j, x) in from.as_ref().iter().enumerate() {
+                    to[j * q.len() + i] = *x;
+                }
+            }
+        }
+        s
+    }
+
+    /// Position, velocity and acceleration of joint `j` at sample `i`.
+    pub fn at(&self, j: usize, i: usize) -> [f64; 3] {
+        let k = j * self.count + i;
+        [self.q[k], self.qd[k], self.qdd[k]]
+    }
+
+    fn check(&self, tree: &Tree) {
+        assert_eq!(self.dof, tree.dof(), "motion and robot differ in their coordinates");
+        let n = self.dof * self.count;
+        assert!(self.q.len() == n && self.qd.len() == n && self.qdd.len() == n);
+    }
+
+    /// Pointers to the pack that starts at sample `i`.
+    ///
+    /// # Safety
+    /// `i` must be a sample.
+    unsafe fn pack(&self, i: usize) -> Pack {
+        // SAFETY: by the caller's promise
+        unsafe {
+            Pack {
+                q: self.q.as_ptr().add(i),
+                qd: self.qd.as_ptr().add(i),
+                qdd: self.qdd.as_ptr().add(i),
+                stride: self.count,
+            }
+        }
+    }
+}
+
+/// Memory of one thread. Grows at first use and is then reused.
+#[derive(Clone)]
+pub struct Workspace {
+    isa: Isa,
+    one: Scratch<f64>,
+    portable: Scratch<Portable4>,
+    #[cfg(target_arch = "x86_64")]
+    avx2: Scratch<lanes::Avx2>,
+    #[cfg(target_arch = "x86_64")]
+    avx512: Scratch<lanes::Avx512>,
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::with_isa(Isa::detect())
+    }
+}
+
+impl Workspace {
+    /// A workspace for a given instruction set (for tests and benchmarks).
+    ///
+    /// # Panics
+    /// If this machine does not have it.
+    pub fn with_isa(isa: Isa) -> Self {
+        assert!(Isa::available().contains(&isa), "{isa:?} is not available on this machine");
+        Workspace {
+            isa,
+            one: Scratch::default(),
+            portable: Scratch::default(),
+            #[cfg(target_arch = "x86_64")]
+            avx2: Scratch::default(),
+            #[cfg(target_arch = "x86_64")]
+            avx512: Scratch::default(),
+        }
+    }
+}
+
+/// One run over a range of samples; implemented once for each kernel.
+trait Job {
+    /// Handles the pack of `L::WIDTH` samples that starts at `i`.
+    ///
+    /// # Safety
+    /// All of them must be samples of the job.
+    unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>);
+}
+
+#[inline(always)]
+unsafe fn sweep<L: Lanes, J: Job>(job: &J, from: usize, to: usize, s: &mut Scratch<L>) -> usize {
+    let mut i = from;
+    while i + L::WIDTH <= to {
+        // SAFETY: i .. i + WIDTH lies in from .. to
+        unsafe { job.pack::<L>(i, s) };
+        i += L::WIDTH;
+    }
+    i
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn sweep_avx2<J: Job>(job: &J, from: usize, to: usize, s: &mut Scratch<lanes::Avx2>) -> usize {
+    // SAFETY: the caller made sure of AVX2
+    unsafe { sweep(job, from, to, s) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq")]
+unsafe fn sweep_avx512<J: Job>(
+    job: &J,
+    from: usize,
+    to: usize,
+    s: &mut Scratch<lanes::Avx512>,
+) -> usize {
+    // SAFETY: the caller made sure of AVX-512
+    unsafe { sweep(job, from, to, s) }
+}
+
+fn run<J: Job>(job: &J, count: usize, ws: &mut Workspace) {
+    // SAFETY: the workspace was made for an instruction set that this machine has, and all packs
+    // lie within the `count` samples that the public functions have checked
+    unsafe {
+        let done = match ws.isa {
+            Isa::Scalar => 0,
+            Isa::Portable => sweep(job, 0, count, &mut ws.portable),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => sweep_avx2(job, 0, count, &mut ws.avx2),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => {
+                let done = sweep_avx512(job, 0, count, &mut ws.avx512);
+                sweep_avx2(job, done, count, &mut ws.avx2)
+            }
+        };
+        sweep(job, done, count, &mut ws.one);
+    }
+}
+
+struct RegressorJob<'a> {
+    tree: &'a Tree,
+    motion: &'a Samples,
+    sink: Sink,
+}
+impl Job for RegressorJob<'_> {
+    #[inline(always)]
+    unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let sink = Sink { base: self.sink.base.add(i), ..self.sink };
+            kernel::regressor(self.tree, self.motion.pack(i), s, sink);
+        }
+    }
+}
+
+struct TorqueJob<'a> {
+    tree: &'a Tree,
+    phi: &'a [f64],
+    motion: &'a Samples,
+    tau: *mut f64,
+}
+impl Job for TorqueJob<'_> {
+    #[inline(always)]
+    unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let (pack, row) = (self.motion.pack(i), self.motion.count);
+            kernel::inverse_dynamics(self.tree, self.phi, pack, s, self.tau.add(i), row);
+        }
+    }
+}
+
+struct GradientJob<'a> {
+    tree: &'a Tree,
+    parameters: &'a [f64],
+    each: usize,
+    motion: &'a Samples,
+    rates: *const f64,
+    out: Gradients,
+    step: usize,
+}
+impl Job for GradientJob<'_> {
+    #[inline(always)]
+    unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let out = Gradients {
+                q: self.out.q.add(i),
+                qd: self.out.qd.add(i),
+                qdd: self.out.qdd.add(i),
+                row: self.out.row,
+            };
+            let (pack, rates) = (self.motion.pack(i), self.rates.add(i));
+            kernel::gradients(
+                self.tree, self.parameters, self.each, pack, s, rates, out, self.step,
+            );
+        }
+    }
+}
+
+impl Tree {
+    /// Rigid-body regressor of all samples, stacked joint-major: entry of coordinate `j`, sample
+    /// `i`, column `c` at `w[c * stride + j * count + i]` with `count` the samples of the motion.
+    /// Columns `10·body + k`, see [`inertia`](crate::robot::inertia).
+    ///
+    /// `Y_ij φ_j = v_ij·f_j + w_ij·n_j` (Atkeson, An & Hollerbach 1986, eq. 10-14).
+    /// Blocks of coordinates that do not move a body are zero by structure and are **not
+    /// written**: hand in memory that was zeroed once.
+    ///
+    /// # Panics
+    /// If `w` is too short or the motion is of another robot.
+    pub fn regressor(&self, ws: &mut Workspace, motion: &Samples, w: &mut [f64], stride: usize) {
+        motion.check(self);
+        let rows = self.dof() * motion.count;
+        assert!(stride >= rows, "stride {stride} is less than {rows} rows");
+        let columns = 10 * self.bodies();
+        assert!(w.len() >= stride * (columns - 1) + rows, "regressor needs {columns} columns");
+        if self.shared {
+            for c in 0..columns {
+                w[c * stride..c * stride + rows].fill(0.0);
+            }
+        }
+        let sink = Sink { base: w.as_mut_ptr(), column: stride, row: motion.count };
+        run(&RegressorJob { tree: self, motion, sink }, motion.count, ws);
+    }
+
+    /// Inverse dynamics of the rigid bodies: `τ = Y φ` by recursive Newton-Euler, coordinate `j`
+    /// at sample `i` in `tau[j * count + i]`, N m or N. `phi` holds ten parameters a body first;
+    /// what follows is ignored.
+    ///
+    /// # Panics
+    /// If an array is too short or the motion is of another robot.
+    pub fn inverse_dynamics(
+        &self,
+        ws: &mut Workspace,
+        phi: &[f64],
+        motion: &Samples,
+        tau: &mut [f64],
+    ) {
+        motion.check(self);
+        assert!(phi.len() >= 10 * self.bodies(), "ten parameters a body");
+        assert!(tau.len() >= self.dof() * motion.count, "torques do not fit");
+        let job = TorqueJob { tree: self, phi, motion, tau: tau.as_mut_ptr() };
+        run(&job, motion.count, ws);
+    }
+
+    /// Adjoint product of the inverse dynamics: for each of the parameter vectors `φ_k` (in
+    /// `parameters`, each `10·bodies` long) and rates `r_k` the gradient of
+    /// `Σ_j r_kj τ_j(q, q̇, q̈; φ_k)` with respect to `q`, `q̇` and `q̈` of every sample, added to
+    /// `out`. All arrays hold, for vector `k`, joint `j`, sample `i`, entry
+    /// `(k·dof + j)·count + i`.
+    ///
+    /// With `r = weights · τ` this is the gradient of `½ ‖W φ‖²`: the derivative of an eigenvalue
+    /// of the information matrix. Cost: kinematics once and about three inverse dynamics for
+    /// each `k`.
+    ///
+    /// # Panics
+    /// If an array is too short or the motion is of another robot.
+    pub fn gradients(
+        &self,
+        ws: &mut Workspace,
+        parameters: &[f64],
+        motion: &Samples,
+        rates: &[f64],
+        out: &mut Derivatives,
+    ) {
+        motion.check(self);
+        let each = 10 * self.bodies();
+        let step = self.dof() * motion.count;
+        let k = parameters.len() / each;
+        assert!(rates.len() >= k * step, "rates for every vector and sample");
+        out.resize(k * step);
+        let Derivatives { q, qd, qdd } = out;
+        let out = Gradients {
+            q: q.as_mut_ptr(),
+            qd: qd.as_mut_ptr(),
+            qdd: qdd.as_mut_ptr(),
+            row: motion.count,
+        };
+        let rates = rates.as_ptr();
+        let job = GradientJob { tree: self, parameters, each, motion, rates, out, step };
+        run(&job, motion.count, ws);
+    }
+}
+
+/// Gradients with respect to positions, velocities and accelerations of every sample.
+#[derive(Debug, Clone, Default)]
+pub struct Derivatives {
+    /// `∂/∂q`
+    pub q: Vec<f64>,
+    /// `∂/∂q̇`
+    pub qd: Vec<f64>,
+    /// `∂/∂q̈`
+    pub qdd: Vec<f64>,
+}
+
+impl Derivatives {
+    /// Sets all to `n` zeros.
+    pub fn resize(&mut self, n: usize) {
+        for x in [&mut self.q, &mut self.qd, &mut self.qdd] {
+            x.clear();
+            x.resize(n, 0.0);
+        }
+    }
+}
