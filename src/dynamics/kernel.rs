@@ -22,7 +22,7 @@
 //! dynamics: the reverse mode of the recursion above.
 
 use super::lanes::*;
-use super::tree::Tree;
+use super::tree::{Node, Tree};
 use crate::robot::Motion;
 
 /// Kinematics of one body for one pack of samples.
@@ -59,9 +59,22 @@ pub(crate) struct Scratch<L> {
     twists: Vec<(V3<L>, V3<L>)>,
 }
 
-impl<L> Default for Scratch<L> {
+impl<L: Lanes> Default for Scratch<L> {
     fn default() -> Self {
         Scratch { frames: Vec::new(), flows: Vec::new(), twists: Vec::new() }
+    }
+}
+
+impl<L: Lanes> Scratch<L> {
+    /// Makes room for a robot; does nothing the second time.
+    pub fn fit(&mut self, tree: &Tree) {
+        let z = zero();
+        let frame =
+            Frame { r: [z; 3], p: z, omega: z, alpha: z, acc: z, qd: L::splat(0.0) };
+        let flow = Flow { f: z, n: z, v: z, w: z, acc: z, alpha: z, omega: z };
+        self.frames.resize(tree.nodes.len(), frame);
+        self.flows.resize(tree.nodes.len(), flow);
+        self.twists.resize(tree.twist_start[tree.nodes.len()], (z, z));
     }
 }
 
@@ -81,9 +94,8 @@ pub(crate) struct Pack {
 /// `pack` must point to `tree.dof()` joints of `L::WIDTH` samples.
 #[inline(always)]
 unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
-    s.frames.clear();
     let g = splat3::<L>(&tree.gravity);
-    for node in &tree.nodes {
+    for (index, node) in tree.nodes.iter().enumerate() {
         // SAFETY: by the caller's promise
         let (q, qd, qdd) = unsafe {
             let k = node.coordinate * pack.stride;
@@ -95,22 +107,19 @@ unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
         let r: M3<L> = match node.motion {
             Motion::Revolute => {
                 let (sin, cos) = sin_cos(q);
-                std::array::from_fn(|i| {
-                    std::array::from_fn(|j| {
-                        sin * node.rs[i][j] + cos * node.rc[i][j] + L::splat(node.r0[i][j])
-                    })
-                })
+                turn(node, sin, cos)
             }
             Motion::Prismatic => {
                 p = add(p, scale(splat3(&node.slide), q));
-                std::array::from_fn(|i| splat3(&node.r0[i]))
+                [splat3(&node.r0[0]), splat3(&node.r0[1]), splat3(&node.r0[2])]
             }
         };
         let (omega, alpha, acc) = match node.parent {
             Some(parent) => {
                 let b = &s.frames[parent];
-                let lever = add(cross(b.alpha, p), cross(b.omega, cross(b.omega, p)));
-                (mul_t(&r, b.omega), mul_t(&r, b.alpha), mul_t(&r, add(b.acc, lever)))
+                let (omega, alpha) = (get(&b.omega), get(&b.alpha));
+                let lever = add(cross(alpha, p), cross(omega, cross(omega, p)));
+                (mul_t(&r, omega), mul_t(&r, alpha), mul_t(&r, add(get(&b.acc), lever)))
             }
             None => (zero(), zero(), mul_t(&r, [-g[0], -g[1], -g[2]])),
         };
@@ -124,8 +133,29 @@ unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
                 (omega, alpha, add(acc, add(scale(a, qdd), scale(cross(omega, a), qd + qd))))
             }
         };
-        s.frames.push(Frame { r, p, omega, alpha, acc, qd });
+        let frame = &mut s.frames[index];
+        for i in 0..3 {
+            set(&mut frame.r[i], r[i]);
+        }
+        set(&mut frame.p, p);
+        set(&mut frame.omega, omega);
+        set(&mut frame.alpha, alpha);
+        set(&mut frame.acc, acc);
+        frame.qd = qd;
     }
+}
+
+/// `r0 + sin rs + cos rc`, written out: closures over arrays would not be inlined into the
+/// functions compiled for wide packs.
+#[inline(always)]
+fn turn<L: Lanes>(node: &Node, sin: L, cos: L) -> M3<L> {
+    let mut r = [zero(); 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            r[i][j] = sin * node.rs[i][j] + cos * node.rc[i][j] + L::splat(node.r0[i][j]);
+        }
+    }
+    r
 }
 
 /// Where a kernel writes the regressor: column `c`, coordinate `j`, sample `i` at
@@ -148,9 +178,9 @@ pub(crate) unsafe fn regressor<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratc
     // SAFETY: by the caller's promise
     unsafe { kinematics(tree, pack, s) };
     let Scratch { frames, twists, .. } = s;
-    twists.resize(tree.twist_start[tree.nodes.len()], (zero(), zero()));
     for (j, chain) in tree.chains.iter().enumerate() {
-        let Frame { omega: o, alpha: al, acc: a, .. } = frames[j];
+        let b = &frames[j];
+        let (o, al, a) = (get(&b.omega), get(&b.alpha), get(&b.acc));
         // D = skew(α) + skew(ω)²
         let (xy, xz, yz) = (o[0] * o[1], o[0] * o[2], o[1] * o[2]);
         let (xx, yy, zz) = (o[0] * o[0], o[1] * o[1], o[2] * o[2]);
@@ -163,19 +193,23 @@ pub(crate) unsafe fn regressor<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratc
         let last = chain.len() - 1;
         if let Some(parent) = tree.nodes[j].parent {
             let from = tree.twist_start[parent];
-            let Frame { r, p, .. } = frames[j];
+            let Frame { r, p, .. } = &frames[j];
             for k in 0..last {
-                let (v, w) = twists[from + k];
-                twists[first + k] = (mul_t(&r, add(v, cross(w, p))), mul_t(&r, w));
+                let (v, w) = (get(&twists[from + k].0), get(&twists[from + k].1));
+                let (v, w) = (mul_t(r, add(v, cross(w, get(p)))), mul_t(r, w));
+                set(&mut twists[first + k].0, v);
+                set(&mut twists[first + k].1, w);
             }
         }
         let axis = splat3::<L>(&tree.nodes[j].axis);
-        twists[first + last] = match tree.nodes[j].motion {
+        let (v, w) = match tree.nodes[j].motion {
             Motion::Revolute => (zero(), axis),
             Motion::Prismatic => (axis, zero()),
         };
+        set(&mut twists[first + last].0, v);
+        set(&mut twists[first + last].1, w);
         for (k, &i) in chain.iter().enumerate() {
-            let (v, w) = twists[first + k];
+            let (v, w) = (get(&twists[first + k].0), get(&twists[first + k].1));
             let vd = mul_t(&d, v);
             let aw = cross(a, w);
             let u = cross(w, o);
@@ -196,18 +230,27 @@ pub(crate) unsafe fn regressor<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratc
             unsafe {
                 let at = sink.base.add(10 * j * sink.column + node.coordinate * sink.row);
                 if tree.shared {
-                    for (c, y) in y.into_iter().enumerate() {
-                        let at = at.add(c * sink.column);
-                        (L::load(at) + y * node.ratio).store(at);
+                    for c in 0..10 {
+                        accumulate(at.add(c * sink.column), y[c] * node.ratio);
                     }
                 } else {
-                    for (c, y) in y.into_iter().enumerate() {
-                        y.store(at.add(c * sink.column));
+                    for c in 0..10 {
+                        y[c].store(at.add(c * sink.column));
                     }
                 }
             }
         }
     }
+}
+
+/// Adds a pack to memory.
+///
+/// # Safety
+/// `at .. at + L::WIDTH` must be readable and writable.
+#[inline(always)]
+unsafe fn accumulate<L: Lanes>(at: *mut f64, x: L) {
+    // SAFETY: by the caller's promise
+    unsafe { (L::load(at) + x).store(at) }
 }
 
 /// Inertial parameters as the wrench needs them.
@@ -228,29 +271,23 @@ fn params(phi: &[f64], body: usize) -> Params {
 #[inline(always)]
 fn wrenches<L: Lanes>(tree: &Tree, phi: &[f64], s: &mut Scratch<L>) {
     let Scratch { frames, flows, .. } = s;
-    flows.clear();
-    for (j, b) in frames.iter().enumerate() {
+    for (j, (b, flow)) in frames.iter().zip(flows.iter_mut()).enumerate() {
         let p = params(phi, j);
         let h = splat3::<L>(&p.h);
-        let f = add(
-            scale(b.acc, L::splat(p.m)),
-            add(cross(b.alpha, h), cross(b.omega, cross(b.omega, h))),
-        );
-        let n = add(
-            cross(h, b.acc),
-            add(sym_mul(&p.i, b.alpha), cross(b.omega, sym_mul(&p.i, b.omega))),
-        );
-        let z = zero();
-        flows.push(Flow { f, n, v: z, w: z, acc: z, alpha: z, omega: z });
+        let (o, al, a) = (get(&b.omega), get(&b.alpha), get(&b.acc));
+        let f = add(scale(a, L::splat(p.m)), add(cross(al, h), cross(o, cross(o, h))));
+        let n = add(cross(h, a), add(sym_mul(&p.i, al), cross(o, sym_mul(&p.i, o))));
+        set(&mut flow.f, f);
+        set(&mut flow.n, n);
     }
     for j in (0..frames.len()).rev() {
         if let Some(parent) = tree.nodes[j].parent {
-            let Flow { f, n, .. } = flows[j];
-            let Frame { r, p, .. } = frames[j];
-            let force = mul(&r, f);
-            let moment = add(mul(&r, n), cross(p, force));
-            flows[parent].f = add(flows[parent].f, force);
-            flows[parent].n = add(flows[parent].n, moment);
+            let (f, n) = (get(&flows[j].f), get(&flows[j].n));
+            let Frame { r, p, .. } = &frames[j];
+            let force = mul(r, f);
+            let moment = add(mul(r, n), cross(get(p), force));
+            increase(&mut flows[parent].f, force);
+            increase(&mut flows[parent].n, moment);
         }
     }
 }
@@ -279,11 +316,10 @@ pub(crate) unsafe fn inverse_dynamics<L: Lanes>(
         for (node, flow) in tree.nodes.iter().zip(&s.flows) {
             let a = splat3::<L>(&node.axis);
             let t = match node.motion {
-                Motion::Revolute => dot(a, flow.n),
-                Motion::Prismatic => dot(a, flow.f),
+                Motion::Revolute => dot(a, get(&flow.n)),
+                Motion::Prismatic => dot(a, get(&flow.f)),
             };
-            let at = tau.add(node.coordinate * row);
-            (L::load(at) + t * node.ratio).store(at);
+            accumulate(tau.add(node.coordinate * row), t * node.ratio);
         }
     }
 }
@@ -314,11 +350,12 @@ unsafe fn adjoint<L: Lanes>(
     // upwards: the motion that the rates give, and what each body's own power depends on
     for j in 0..frames.len() {
         let node = &tree.nodes[j];
-        let Frame { r, p, omega: o, .. } = frames[j];
+        let Frame { r, p, omega: o, .. } = &frames[j];
+        let o = get(o);
         let (mut v, mut w) = match node.parent {
             Some(parent) => {
-                let Flow { v, w, .. } = flows[parent];
-                (mul_t(&r, add(v, cross(w, p))), mul_t(&r, w))
+                let (v, w) = (get(&flows[parent].v), get(&flows[parent].w));
+                (mul_t(r, add(v, cross(w, get(p)))), mul_t(r, w))
             }
             None => (zero(), zero()),
         };
@@ -332,58 +369,59 @@ unsafe fn adjoint<L: Lanes>(
         let pr = params(phi, j);
         let h = splat3::<L>(&pr.h);
         let flow = &mut flows[j];
-        flow.v = v;
-        flow.w = w;
-        flow.acc = add(scale(v, L::splat(pr.m)), cross(w, h));
-        flow.alpha = add(cross(h, v), sym_mul(&pr.i, w));
-        flow.omega = add(
-            add(cross(cross(o, h), v), cross(h, cross(v, o))),
-            add(cross(sym_mul(&pr.i, o), w), sym_mul(&pr.i, cross(w, o))),
-        );
+        set(&mut flow.v, v);
+        set(&mut flow.w, w);
+        set(&mut flow.acc, add(scale(v, L::splat(pr.m)), cross(w, h)));
+        set(&mut flow.alpha, add(cross(h, v), sym_mul(&pr.i, w)));
+        let linear = add(cross(cross(o, h), v), cross(h, cross(v, o)));
+        let angular = add(cross(sym_mul(&pr.i, o), w), sym_mul(&pr.i, cross(w, o)));
+        set(&mut flow.omega, add(linear, angular));
     }
     // downwards: adjoints of acceleration and velocity; those of (v, w) are the wrenches
     for j in (0..frames.len()).rev() {
         let node = &tree.nodes[j];
-        let b = frames[j];
-        let fl = flows[j];
+        let b = &frames[j];
+        let (below, here) = flows.split_at_mut(j);
+        let fl = &here[0];
         let a = splat3::<L>(&node.axis);
-        let wa = cross(b.omega, a);
+        let (f, n, v, w) = (get(&fl.f), get(&fl.n), get(&fl.v), get(&fl.w));
+        let (acc_bar, alpha_bar, omega_bar) = (get(&fl.acc), get(&fl.alpha), get(&fl.omega));
+        let (o, al) = (get(&b.omega), get(&b.alpha));
+        let oa = cross(o, a);
         let (dq, dqd, dqdd, omega);
         match node.motion {
             Motion::Revolute => {
-                omega = add(fl.omega, scale(cross(a, fl.alpha), b.qd));
+                omega = add(omega_bar, scale(cross(a, alpha_bar), b.qd));
                 let twist = add(
-                    add(cross(omega, b.omega), cross(fl.alpha, sub(b.alpha, scale(wa, b.qd)))),
-                    add(cross(fl.acc, b.acc), add(cross(fl.n, fl.w), cross(fl.f, fl.v))),
+                    add(cross(omega, o), cross(alpha_bar, sub(al, scale(oa, b.qd)))),
+                    add(cross(acc_bar, get(&b.acc)), add(cross(n, w), cross(f, v))),
                 );
                 dq = dot(a, twist);
-                dqd = dot(a, fl.omega) + dot(fl.alpha, wa);
-                dqdd = dot(a, fl.alpha);
+                dqd = dot(a, omega_bar) + dot(alpha_bar, oa);
+                dqdd = dot(a, alpha_bar);
             }
             Motion::Prismatic => {
-                omega = add(fl.omega, scale(cross(a, fl.acc), b.qd + b.qd));
-                dq = dot(fl.acc, add(cross(b.alpha, a), cross(b.omega, wa)))
-                    + dot(fl.f, cross(fl.w, a));
-                dqd = dot(fl.acc, wa) * 2.0;
-                dqdd = dot(a, fl.acc);
+                omega = add(omega_bar, scale(cross(a, acc_bar), b.qd + b.qd));
+                dq = dot(acc_bar, add(cross(al, a), cross(o, oa))) + dot(f, cross(w, a));
+                dqd = dot(acc_bar, oa) * 2.0;
+                dqdd = dot(a, acc_bar);
             }
         }
         // SAFETY: by the caller's promise
         unsafe {
-            for (value, at) in [(dq, out.q), (dqd, out.qd), (dqdd, out.qdd)] {
-                let at = at.add(node.coordinate * out.row);
-                (L::load(at) + value * node.ratio).store(at);
-            }
+            let k = node.coordinate * out.row;
+            accumulate(out.q.add(k), dq * node.ratio);
+            accumulate(out.qd.add(k), dqd * node.ratio);
+            accumulate(out.qdd.add(k), dqdd * node.ratio);
         }
         if let Some(parent) = node.parent {
-            let Frame { r, p, .. } = b;
-            let o = frames[parent].omega;
-            let g = mul(&r, fl.acc);
-            let up = &mut flows[parent];
-            up.acc = add(up.acc, g);
-            up.alpha = add(up.alpha, add(mul(&r, fl.alpha), cross(p, g)));
+            let (r, p, o) = (&b.r, get(&b.p), get(&frames[parent].omega));
+            let g = mul(r, acc_bar);
+            let up = &mut below[parent];
+            increase(&mut up.acc, g);
+            increase(&mut up.alpha, add(mul(r, alpha_bar), cross(p, g)));
             let lever = add(cross(cross(o, p), g), cross(p, cross(g, o)));
-            up.omega = add(up.omega, add(mul(&r, omega), lever));
+            increase(&mut up.omega, add(mul(r, omega), lever));
         }
     }
 }

@@ -251,6 +251,25 @@ pub type M3<L> = [V3<L>; 3];
 pub(crate) fn zero<L: Lanes>() -> V3<L> {
     [L::splat(0.0); 3]
 }
+/// Reads element by element: a copy of a whole array of wide packs would become a call of memcpy.
+#[inline(always)]
+pub(crate) fn get<L: Lanes>(a: &V3<L>) -> V3<L> {
+    [a[0], a[1], a[2]]
+}
+/// Writes element by element, for the same reason.
+#[inline(always)]
+pub(crate) fn set<L: Lanes>(to: &mut V3<L>, a: V3<L>) {
+    to[0] = a[0];
+    to[1] = a[1];
+    to[2] = a[2];
+}
+/// `to += a`.
+#[inline(always)]
+pub(crate) fn increase<L: Lanes>(to: &mut V3<L>, a: V3<L>) {
+    to[0] = to[0] + a[0];
+    to[1] = to[1] + a[1];
+    to[2] = to[2] + a[2];
+}
 #[inline(always)]
 pub(crate) fn add<L: Lanes>(a: V3<L>, b: V3<L>) -> V3<L> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]

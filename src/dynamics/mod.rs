@@ -135,6 +135,7 @@ impl Workspace {
 
 /// One run over a range of samples; implemented once for each kernel.
 trait Job {
+    fn tree(&self) -> &Tree;
     /// Handles the pack of `L::WIDTH` samples that starts at `i`.
     ///
     /// # Safety
@@ -144,6 +145,7 @@ trait Job {
 
 #[inline(always)]
 unsafe fn sweep<L: Lanes, J: Job>(job: &J, from: usize, to: usize, s: &mut Scratch<L>) -> usize {
+    s.fit(job.tree());
     let mut i = from;
     while i + L::WIDTH <= to {
         // SAFETY: i .. i + WIDTH lies in from .. to
@@ -197,6 +199,9 @@ struct RegressorJob<'a> {
     sink: Sink,
 }
 impl Job for RegressorJob<'_> {
+    fn tree(&self) -> &Tree {
+        self.tree
+    }
     #[inline(always)]
     unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
         // SAFETY: by the caller's promise
@@ -214,6 +219,9 @@ struct TorqueJob<'a> {
     tau: *mut f64,
 }
 impl Job for TorqueJob<'_> {
+    fn tree(&self) -> &Tree {
+        self.tree
+    }
     #[inline(always)]
     unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
         // SAFETY: by the caller's promise
@@ -234,6 +242,9 @@ struct GradientJob<'a> {
     step: usize,
 }
 impl Job for GradientJob<'_> {
+    fn tree(&self) -> &Tree {
+        self.tree
+    }
     #[inline(always)]
     unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
         // SAFETY: by the caller's promise
