@@ -25,6 +25,7 @@ pub use tree::Tree;
 
 use kernel::{Gradients, Pack, Scratch, Sink};
 use lanes::{Lanes, Portable4};
+use rayon::prelude::*;
 
 /// A sampled motion of all coordinates, joint by joint: joint `j` at sample `i` is
 /// `q[j * count + i]`.
@@ -174,23 +175,33 @@ unsafe fn sweep_avx512<J: Job>(
     unsafe { sweep(job, from, to, s) }
 }
 
-fn run<J: Job>(job: &J, count: usize, ws: &mut Workspace) {
+/// Runs samples `from .. to` of a job on this thread.
+fn run<J: Job>(job: &J, from: usize, to: usize, ws: &mut Workspace) {
     // SAFETY: the workspace was made for an instruction set that this machine has, and all packs
     // lie within the `count` samples that the public functions have checked
     unsafe {
         let done = match ws.isa {
-            Isa::Scalar => 0,
-            Isa::Portable => sweep(job, 0, count, &mut ws.portable),
+            Isa::Scalar => from,
+            Isa::Portable => sweep(job, from, to, &mut ws.portable),
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 => sweep_avx2(job, 0, count, &mut ws.avx2),
+            Isa::Avx2 => sweep_avx2(job, from, to, &mut ws.avx2),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx512 => {
-                let done = sweep_avx512(job, 0, count, &mut ws.avx512);
-                sweep_avx2(job, done, count, &mut ws.avx2)
+                let done = sweep_avx512(job, from, to, &mut ws.avx512);
+                sweep_avx2(job, done, to, &mut ws.avx2)
             }
         };
-        sweep(job, done, count, &mut ws.one);
+        sweep(job, done, to, &mut ws.one);
     }
+}
+
+/// Runs all samples of a job on the threads of the pool; each sample is written by one thread,
+/// so the result does not depend on their number.
+fn run_parallel<J: Job + Sync>(job: &J, count: usize) {
+    const CHUNK: usize = 256;
+    (0..count.div_ceil(CHUNK)).into_par_iter().for_each_init(Workspace::default, |ws, c| {
+        run(job, c * CHUNK, ((c + 1) * CHUNK).min(count), ws);
+    });
 }
 
 struct RegressorJob<'a> {
@@ -198,6 +209,9 @@ struct RegressorJob<'a> {
     motion: &'a Samples,
     sink: Sink,
 }
+// SAFETY: packs of different samples are written to different places, and the memory outlives the
+// run because the functions that make a job also run it
+unsafe impl Sync for RegressorJob<'_> {}
 impl Job for RegressorJob<'_> {
     fn tree(&self) -> &Tree {
         self.tree
@@ -275,6 +289,46 @@ impl Tree {
     /// # Panics
     /// If `w` is too short or the motion is of another robot.
     pub fn regressor(&self, ws: &mut Workspace, motion: &Samples, w: &mut [f64], stride: usize) {
+        let job = self.regressor_job(motion, w, stride);
+        run(&job, 0, motion.count, ws);
+    }
+
+    /// [`Tree::regressor`] in blocks: coordinate `j`, column `c`, sample `i` at
+    /// `w[(j * columns + c) * count + i]`, so that the rows of one joint are a matrix of their own.
+    ///
+    /// # Panics
+    /// If `w` is too short or the motion is of another robot.
+    pub fn regressor_blocks(
+        &self,
+        ws: &mut Workspace,
+        motion: &Samples,
+        w: &mut [f64],
+        columns: usize,
+    ) {
+        motion.check(self);
+        let (dof, count) = (self.dof(), motion.count);
+        assert!(columns >= 10 * self.bodies() && w.len() >= dof * columns * count);
+        if self.shared {
+            w[..dof * columns * count].fill(0.0);
+        }
+        let sink = Sink { base: w.as_mut_ptr(), column: count, row: columns * count };
+        run(&RegressorJob { tree: self, motion, sink }, 0, count, ws);
+    }
+
+    /// [`Tree::regressor`] on all threads of the pool.
+    ///
+    /// # Panics
+    /// As there.
+    pub fn regressor_parallel(&self, motion: &Samples, w: &mut [f64], stride: usize) {
+        run_parallel(&self.regressor_job(motion, w, stride), motion.count);
+    }
+
+    fn regressor_job<'a>(
+        &'a self,
+        motion: &'a Samples,
+        w: &mut [f64],
+        stride: usize,
+    ) -> RegressorJob<'a> {
         motion.check(self);
         let rows = self.dof() * motion.count;
         assert!(stride >= rows, "stride {stride} is less than {rows} rows");
@@ -286,7 +340,7 @@ impl Tree {
             }
         }
         let sink = Sink { base: w.as_mut_ptr(), column: stride, row: motion.count };
-        run(&RegressorJob { tree: self, motion, sink }, motion.count, ws);
+        RegressorJob { tree: self, motion, sink }
     }
 
     /// Inverse dynamics of the rigid bodies: `τ = Y φ` by recursive Newton-Euler, coordinate `j`
@@ -306,7 +360,7 @@ impl Tree {
         assert!(phi.len() >= 10 * self.bodies(), "ten parameters a body");
         assert!(tau.len() >= self.dof() * motion.count, "torques do not fit");
         let job = TorqueJob { tree: self, phi, motion, tau: tau.as_mut_ptr() };
-        run(&job, motion.count, ws);
+        run(&job, 0, motion.count, ws);
     }
 
     /// Adjoint product of the inverse dynamics: for each of the parameter vectors `φ_k` (in
@@ -344,7 +398,7 @@ impl Tree {
         };
         let rates = rates.as_ptr();
         let job = GradientJob { tree: self, parameters, each, motion, rates, out, step };
-        run(&job, motion.count, ws);
+        run(&job, 0, motion.count, ws);
     }
 }
 

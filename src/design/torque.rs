@@ -1,0 +1,127 @@
+//! Torque limits of the nominal model at the samples, and their linearisation.
+//!
+//! `τ(t) = Y φ + I_a q̈ + F_v q̇ + o`, and Coulomb friction counted with whichever sign is worse:
+//! `|τ| + F_c ≤ τ_max`. A row of the subproblem is `τ + ∂τ/∂x δ`, from one adjoint product for
+//! each joint.
+
+use super::information::{Evaluation, Information};
+use crate::dynamics::{Derivatives, Samples, Workspace};
+use crate::robot::{JointTerm, Robot};
+
+/// Torque limits of a robot.
+#[derive(Debug, Clone)]
+pub struct TorqueLimits {
+    phi: Vec<f64>,
+    terms: Vec<[f64; 4]>,
+    /// limit less Coulomb friction, per joint
+    room: Vec<f64>,
+}
+
+/// Torque at a sample, linear in a step of all free numbers.
+#[derive(Debug, Clone)]
+pub struct TorqueRow {
+    /// joint
+    pub joint: usize,
+    /// sample
+    pub sample: usize,
+    /// torque now
+    pub value: f64,
+    /// its limit
+    pub limit: f64,
+    /// gradient with respect to `x`
+    pub gradient: Vec<f64>,
+}
+
+/// Room kept at the samples for what happens between them, as a fraction of the limit.
+const BETWEEN: f64 = 0.004;
+
+impl TorqueLimits {
+    /// Effort limits times `derate`; `None` where no joint has one.
+    pub fn new(robot: &Robot, derate: f64) -> Option<Self> {
+        if robot.joints.iter().all(|j| j.limits.effort.is_infinite()) {
+            return None;
+        }
+        Some(TorqueLimits {
+            phi: robot.bodies.iter().flat_map(|b| b.inertia.0).collect(),
+            terms: robot.joints.iter().map(|j| j.terms).collect(),
+            room: robot
+                .joints
+                .iter()
+                .map(|j| {
+                    let coulomb = j.terms[JointTerm::Coulomb as usize].abs();
+                    j.limits.effort * derate * (1.0 - BETWEEN) - coulomb
+                })
+                .collect(),
+        })
+    }
+
+    /// Torques without Coulomb friction, joint-major.
+    pub fn torques(
+        &self,
+        info: &Information,
+        motion: &Samples,
+        ws: &mut Workspace,
+        tau: &mut Vec<f64>,
+    ) {
+        tau.resize(motion.dof * motion.count, 0.0);
+        info.tree().inverse_dynamics(ws, &self.phi, motion, tau);
+        for (j, [armature, viscous, _, offset]) in self.terms.iter().enumerate() {
+            for i in 0..motion.count {
+                let [_, qd, qdd] = motion.at(j, i);
+                tau[j * motion.count + i] += armature * qdd + viscous * qd + offset;
+            }
+        }
+    }
+
+    /// Largest torque over its limit, with the joint; at most 1 inside.
+    pub fn worst(&self, tau: &[f64]) -> (f64, usize) {
+        let count = tau.len() / self.room.len();
+        let mut worst = (0.0, 0);
+        for (j, room) in self.room.iter().enumerate() {
+            let most = tau[j * count..(j + 1) * count].iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+            let used = if *room > 0.0 { most / room } else { f64::INFINITY };
+            if used > worst.0 {
+                worst = (used, j);
+            }
+        }
+        worst
+    }
+
+    /// Linearised torques that use more than `from` of their limit, at an evaluated point.
+    pub fn rows(&self, info: &Information, e: &mut Evaluation, from: f64) -> Vec<TorqueRow> {
+        let (count, dof) = (e.motion.count, e.motion.dof);
+        let step = count * dof;
+        let mut tau = Vec::new();
+        let mut ws = Workspace::default();
+        self.torques(info, &e.motion, &mut ws, &mut tau);
+        let near: Vec<Vec<usize>> = (0..dof)
+            .map(|j| {
+                (0..count).filter(|i| tau[j * count + i].abs() > from * self.room[j]).collect()
+            })
+            .collect();
+        let mut rows = Vec::new();
+        let mut d = Derivatives::default();
+        for (j, near) in near.into_iter().enumerate() {
+            if near.is_empty() {
+                continue;
+            }
+            let mut rates = vec![0.0; step];
+            rates[j * count..(j + 1) * count].fill(1.0);
+            info.tree().gradients(&mut ws, &self.phi, &e.motion, &rates, &mut d);
+            for i in 0..count {
+                d.qd[j * count + i] += self.terms[j][JointTerm::Viscous as usize];
+                d.qdd[j * count + i] += self.terms[j][JointTerm::Armature as usize];
+            }
+            for i in near {
+                rows.push(TorqueRow {
+                    joint: j,
+                    sample: i,
+                    value: tau[j * count + i],
+                    limit: self.room[j],
+                    gradient: info.pull_back(&d, i),
+                });
+            }
+        }
+        rows
+    }
+}
