@@ -6,6 +6,7 @@
 //! several bodies may follow one coordinate (URDF `mimic`): `q_body = ratio · q + offset`.
 
 pub mod inertia;
+pub mod urdf;
 
 pub use inertia::Inertia;
 
