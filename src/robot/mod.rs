@@ -5,7 +5,10 @@
 //! exactly one moving joint. A *coordinate* is what the user commands and measures ([`Joint`]);
 //! several bodies may follow one coordinate (URDF `mimic`): `q_body = ratio · q + offset`.
 
+pub mod bundled;
+pub mod file;
 pub mod inertia;
+pub mod urdf;
 
 pub use inertia::Inertia;
 

@@ -1,0 +1,393 @@
+//! Robot files: a bundled name, a `.urdf`, or a `robot.toml` that adds what a URDF cannot say.
+
+mod joint;
+mod names;
+mod template;
+
+use super::urdf::{Options, Urdf};
+use super::{Prior, Robot, bundled};
+use crate::error::{Error, Result, Warning};
+use nalgebra::Vector3;
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, HashMap};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+use joint::{JointEntry, joint_values, stated_limits};
+use names::{did_you_mean, listed};
+
+/// Largest robot file that is read, bytes.
+pub const MAX_BYTES: u64 = 64 << 20;
+
+/// `robot.toml` as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RobotFile {
+    name: Option<Spanned<String>>,
+    urdf: Option<Spanned<String>>,
+    #[serde(default)]
+    lock: BTreeMap<String, Spanned<f64>>,
+    // vectors, because an array would swallow further elements in silence
+    gravity: Option<Spanned<Vec<f64>>>,
+    #[serde(default)]
+    prior: Prior,
+    #[serde(default)]
+    joint: Vec<Spanned<JointEntry>>,
+}
+
+/// A file name and its text, for messages and the hash.
+#[derive(Clone, Copy)]
+struct Text<'a> {
+    file: &'a Path,
+    text: &'a str,
+}
+
+impl Text<'_> {
+    /// An error at a byte of the text, about `what` (may be empty).
+    fn error(&self, at: usize, what: &str, message: impl Into<String>) -> Error {
+        let line = 1 + self.text.bytes().take(at).filter(|b| *b == b'\n').count();
+        let colon = if what.is_empty() { "" } else { ": " };
+        Error::file(self.file, format!("line {line}{colon}{what}"), message)
+    }
+
+    fn toml_error(&self, error: &toml::de::Error) -> Error {
+        let message = error.message().trim().replace('\n', "; ");
+        match error.span() {
+            Some(span) => self.error(span.start, "", message),
+            None => Error::file(self.file, "", message),
+        }
+    }
+}
+
+impl Robot {
+    /// Reads a robot: the path of a `robot.toml` or `.urdf`, or the name of a bundled robot. A file
+    /// of that name wins over a bundled robot.
+    ///
+    /// # Errors
+    /// Nothing of that name, or whatever [`Robot::from_toml_str`] and [`Robot::from_urdf_str`]
+    /// find wrong in it.
+    pub fn load(spec: &str) -> Result<Robot> {
+        if spec.trim().is_empty() {
+            return Err(Error::Argument(format!(
+                "no robot is named; give a robot.toml, a .urdf, or one of {}",
+                bundled::names().join(", ")
+            )));
+        }
+        let path = Path::new(spec);
+        let directory = path.is_dir();
+        if path.exists() && !directory {
+            return load_path(path);
+        }
+        if let Some(robot) = bundled::find(spec) {
+            return robot.load();
+        }
+        if directory {
+            return Err(Error::file(
+                path,
+                "",
+                "it is a directory; name the robot.toml or .urdf in it",
+            ));
+        }
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .unwrap_or_default();
+        if path.components().count() > 1 || matches!(extension, "toml" | "urdf" | "xml" | "xacro") {
+            return Err(Error::io(
+                path,
+                std::fs::metadata(path)
+                    .err()
+                    .unwrap_or_else(|| std::io::Error::from(std::io::ErrorKind::NotFound)),
+            ));
+        }
+        Err(Error::Argument(format!(
+            "`{spec}` is neither a file nor a bundled robot{}; bundled are {}",
+            did_you_mean(spec, bundled::names()),
+            bundled::names().join(", ")
+        )))
+    }
+
+    /// A robot from the text of a URDF; `name` is what errors call it, and the robot's name where
+    /// `<robot>` has none.
+    ///
+    /// # Errors
+    /// See [`Urdf::parse`] and [`Urdf::robot`].
+    pub fn from_urdf_str(text: &str, name: &str) -> Result<Robot> {
+        from_urdf(Text {
+            file: Path::new(name),
+            text,
+        })
+    }
+
+    /// A robot from the texts of a `robot.toml` and of the URDF it refers to; `name` is what errors
+    /// call the former.
+    ///
+    /// # Errors
+    /// Unknown keys, unknown or repeated joints, numbers out of range; see also [`Urdf::parse`] and
+    /// [`Urdf::robot`].
+    pub fn from_toml_str(toml: &str, urdf: &str, name: &str) -> Result<Robot> {
+        let text = Text {
+            file: Path::new(name),
+            text: toml,
+        };
+        let file = parse(text)?;
+        let urdf_name = file.urdf.as_ref().map_or("its URDF", |u| u.get_ref());
+        let urdf_path = PathBuf::from(urdf_name);
+        apply(
+            text,
+            &file,
+            Text {
+                file: &urdf_path,
+                text: urdf,
+            },
+        )
+    }
+
+    /// A commented `robot.toml` for this robot with all joints and their present limits; `urdf` is
+    /// the path of the URDF relative to the new file. Read again, it gives the same robot.
+    pub fn to_toml_template(&self, urdf: &str) -> String {
+        template::template(self, urdf)
+    }
+}
+
+/// The file at this path, as text.
+fn read_text(path: &Path) -> Result<String> {
+    let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+    let mut bytes = Vec::new();
+    file.take(MAX_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| Error::io(path, e))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(Error::file(
+            path,
+            "",
+            format!(
+                "larger than {} MiB: this is not a robot file",
+                MAX_BYTES >> 20
+            ),
+        ));
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let valid = e.utf8_error().valid_up_to();
+        let line = 1 + e
+            .as_bytes()
+            .iter()
+            .take(valid)
+            .filter(|b| **b == b'\n')
+            .count();
+        Error::file(
+            path,
+            format!("line {line}"),
+            "it is not UTF-8 text; save it as UTF-8",
+        )
+    })
+}
+
+fn load_path(path: &Path) -> Result<Robot> {
+    let text = read_text(path)?;
+    let source = Text {
+        file: path,
+        text: &text,
+    };
+    let is_toml = match path.extension().and_then(|e| e.to_str()) {
+        Some(e) if e.eq_ignore_ascii_case("toml") => true,
+        Some(e) if e.eq_ignore_ascii_case("urdf") || e.eq_ignore_ascii_case("xml") => false,
+        // a pipe or an unusual extension: XML begins with <
+        _ if text
+            .trim_start_matches('\u{feff}')
+            .trim_start()
+            .starts_with('<') =>
+        {
+            false
+        }
+        _ => {
+            return Err(Error::file(
+                path,
+                "",
+                "a robot file ends in .toml or .urdf; rename it",
+            ));
+        }
+    };
+    let mut robot = if is_toml {
+        let file = parse(source)?;
+        let Some(urdf) = &file.urdf else {
+            return Err(Error::file(
+                path,
+                "",
+                "it names no URDF; add urdf = \"robot.urdf\"",
+            ));
+        };
+        let urdf_path = path.parent().unwrap_or(Path::new("")).join(urdf.get_ref());
+        if urdf_path.is_dir() {
+            return Err(source.error(
+                urdf.span().start,
+                "urdf",
+                format!(
+                    "{} is a directory; name the .urdf file",
+                    urdf_path.display()
+                ),
+            ));
+        }
+        let urdf_text = read_text(&urdf_path).map_err(|e| match e {
+            Error::Io { source: cause, .. } => source.error(
+                urdf.span().start,
+                "urdf",
+                format!(
+                    "cannot read {} ({cause}); the path is relative to this file",
+                    urdf_path.display()
+                ),
+            ),
+            other => other,
+        })?;
+        apply(
+            source,
+            &file,
+            Text {
+                file: &urdf_path,
+                text: &urdf_text,
+            },
+        )?
+    } else {
+        from_urdf(source)?
+    };
+    robot.path = Some(path.to_path_buf());
+    Ok(robot)
+}
+
+fn from_urdf(source: Text) -> Result<Robot> {
+    let urdf = Urdf::parse(source.text, source.file)?;
+    let mut robot = urdf.robot(&Options::default())?;
+    if robot.name.is_empty() {
+        robot.name = file_stem(source.file);
+    }
+    robot.hash = format!("{:x}", Sha256::digest(source.text));
+    Ok(robot)
+}
+
+fn file_stem(file: &Path) -> String {
+    file.file_stem()
+        .map_or_else(|| "robot".to_string(), |s| s.to_string_lossy().into_owned())
+}
+
+fn parse(source: Text) -> Result<RobotFile> {
+    let table: toml::Table = toml::from_str(source.text).map_err(|e| source.toml_error(&e))?;
+    mechanism(source, &table)?;
+    toml::from_str(source.text).map_err(|e| source.toml_error(&e))
+}
+
+/// Where a parallel mechanism would be built instead of a tree.
+fn mechanism(source: Text, table: &toml::Table) -> Result<()> {
+    if !table.contains_key("mechanism") {
+        return Ok(());
+    }
+    Err(Error::file(
+        source.file,
+        "mechanism",
+        "parallel mechanisms: not supported by this version",
+    ))
+}
+
+/// The robot of `urdf` with what `file` states.
+fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
+    let tree = Urdf::parse(urdf.text, urdf.file)?;
+    let names: Vec<&str> = tree.joint_names().collect();
+    let unknown = |name: &str, at: usize, what: &str| {
+        source.error(
+            at,
+            what,
+            format!(
+                "the URDF has no joint `{name}`{}; its joints are {}",
+                did_you_mean(name, names.iter().copied()),
+                listed(&names)
+            ),
+        )
+    };
+    let mut options = Options::default();
+    for (name, value) in &file.lock {
+        if !names.contains(&name.as_str()) {
+            return Err(unknown(name, value.span().start, "lock"));
+        }
+        if !value.get_ref().is_finite() {
+            return Err(source.error(
+                value.span().start,
+                "lock",
+                format!(
+                    "`{name}` is locked at {}; state a finite position",
+                    value.get_ref()
+                ),
+            ));
+        }
+        options.lock.insert(name.clone(), *value.get_ref());
+    }
+    let mut entries: HashMap<&str, &JointEntry> = HashMap::new();
+    for entry in file.joint.iter().map(Spanned::get_ref) {
+        let (name, at) = (entry.name.get_ref().as_str(), entry.name.span().start);
+        if !names.contains(&name) {
+            return Err(unknown(name, at, "[[joint]]"));
+        }
+        let what = format!("joint `{name}`");
+        if entries.insert(name, entry).is_some() {
+            return Err(source.error(at, &what, "it has two [[joint]] entries; merge them"));
+        }
+        if tree.is_fixed(name) == Some(true) {
+            return Err(source.error(at, &what, "it is fixed in the URDF; remove this entry"));
+        }
+        if let Some(leader) = tree.mimics(name)
+            && !options.lock.contains_key(name)
+        {
+            return Err(source.error(
+                at,
+                &what,
+                format!("it mimics `{leader}`; state its values for that joint"),
+            ));
+        }
+        options
+            .limits
+            .insert(name.to_string(), stated_limits(source, entry, &what)?);
+    }
+
+    let mut robot = tree.robot(&options)?;
+    robot.prior = file.prior;
+    if let Some(gravity) = &file.gravity {
+        robot.gravity = match gravity.get_ref()[..] {
+            [x, y, z] if x.is_finite() && y.is_finite() && z.is_finite() => Vector3::new(x, y, z),
+            _ => {
+                return Err(source.error(
+                    gravity.span().start,
+                    "gravity",
+                    "it must be three finite numbers, m/s^2",
+                ));
+            }
+        };
+    }
+    if let Some(name) = &file.name {
+        robot.name = name.get_ref().trim().to_string();
+    }
+    if robot.name.is_empty() {
+        robot.name = file_stem(source.file);
+    }
+    for entry in file.joint.iter().map(Spanned::get_ref) {
+        let name = entry.name.get_ref();
+        let what = format!("joint `{name}`");
+        match robot.joints.iter_mut().find(|j| j.name == *name) {
+            Some(joint) => {
+                let warnings = &mut robot.warnings;
+                joint_values(source, entry, &what, joint, warnings)?;
+            }
+            None => robot.warnings.push(Warning::new(
+                what,
+                "it is locked; its [[joint]] entry has no effect",
+            )),
+        }
+    }
+    robot.hash = format!(
+        "{:x}",
+        Sha256::new()
+            .chain_update(source.text)
+            .chain_update(urdf.text)
+            .finalize()
+    );
+    Ok(robot)
+}

@@ -1,0 +1,158 @@
+//! One `[[joint]]` of a `robot.toml`.
+
+use super::Text;
+use crate::error::{Result, Warning};
+use crate::robot::urdf::StatedLimits;
+use crate::robot::{Joint, JointTerm};
+use serde::Deserialize;
+use toml::Spanned;
+
+/// One `[[joint]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct JointEntry {
+    pub(super) name: Spanned<String>,
+    position: Option<Spanned<Vec<f64>>>,
+    velocity: Option<Spanned<f64>>,
+    acceleration: Option<Spanned<f64>>,
+    jerk: Option<Spanned<f64>>,
+    effort: Option<Spanned<f64>>,
+    torque_noise: Option<Spanned<f64>>,
+    position_resolution: Option<Spanned<f64>>,
+    gear_ratio: Option<Spanned<f64>>,
+    armature: Option<Spanned<f64>>,
+    viscous: Option<Spanned<f64>>,
+    coulomb: Option<Spanned<f64>>,
+    offset: Option<Spanned<f64>>,
+    #[serde(default)]
+    identify: Vec<Spanned<String>>,
+}
+
+/// The limits that replace those of the URDF, checked.
+pub(super) fn stated_limits(source: Text, entry: &JointEntry, what: &str) -> Result<StatedLimits> {
+    let position = match &entry.position {
+        None => None,
+        Some(position) => match position.get_ref()[..] {
+            // false where one of them is not a number
+            [lower, upper] if lower < upper => Some([lower, upper]),
+            _ => {
+                return Err(source.error(
+                    position.span().start,
+                    what,
+                    "position must be two numbers [lower, upper] with lower < upper",
+                ));
+            }
+        },
+    };
+    Ok(StatedLimits {
+        position,
+        velocity: positive(source, &entry.velocity, "velocity", what)?,
+        effort: positive(source, &entry.effort, "effort", what)?,
+    })
+}
+
+/// A positive limit; infinite means none.
+fn positive(
+    source: Text,
+    value: &Option<Spanned<f64>>,
+    key: &str,
+    what: &str,
+) -> Result<Option<f64>> {
+    match value {
+        Some(v) if v.get_ref().is_nan() || *v.get_ref() <= 0.0 => Err(source.error(
+            v.span().start,
+            what,
+            format!(
+                "{key} = {} must be positive; leave it out where there is none",
+                v.get_ref()
+            ),
+        )),
+        Some(v) => Ok(Some(*v.get_ref())),
+        None => Ok(None),
+    }
+}
+
+/// A positive number; infinite is an error, too.
+fn positive_finite(
+    source: Text,
+    value: &Option<Spanned<f64>>,
+    key: &str,
+    what: &str,
+) -> Result<Option<f64>> {
+    match (positive(source, value, key, what)?, value) {
+        (Some(x), Some(v)) if x.is_infinite() => {
+            Err(source.error(v.span().start, what, format!("{key} must be finite")))
+        }
+        (x, _) => Ok(x),
+    }
+}
+
+/// Everything of a `[[joint]]` that the tree does not need.
+pub(super) fn joint_values(
+    source: Text,
+    entry: &JointEntry,
+    what: &str,
+    joint: &mut Joint,
+    warnings: &mut Vec<Warning>,
+) -> Result<()> {
+    if let Some(a) = positive(source, &entry.acceleration, "acceleration", what)? {
+        joint.limits.acceleration = a;
+    }
+    if let Some(j) = positive(source, &entry.jerk, "jerk", what)? {
+        joint.limits.jerk = j;
+    }
+    joint.torque_noise = positive_finite(source, &entry.torque_noise, "torque_noise", what)?;
+    joint.position_resolution = positive_finite(
+        source,
+        &entry.position_resolution,
+        "position_resolution",
+        what,
+    )?;
+    if let Some(ratio) = &entry.gear_ratio {
+        let value = *ratio.get_ref();
+        if !value.is_finite() || value == 0.0 {
+            return Err(source.error(
+                ratio.span().start,
+                what,
+                format!("gear_ratio = {value} must be finite and not 0"),
+            ));
+        }
+        joint.gear_ratio = Some(value);
+    }
+    let terms = [
+        &entry.armature,
+        &entry.viscous,
+        &entry.coulomb,
+        &entry.offset,
+    ];
+    for (term, value) in JointTerm::ALL.into_iter().zip(terms) {
+        let Some(value) = value else { continue };
+        let (at, value) = (value.span().start, *value.get_ref());
+        if !value.is_finite() {
+            return Err(source.error(at, what, format!("{} must be finite", term.name())));
+        }
+        if value < 0.0 && term != JointTerm::Offset {
+            warnings.push(Warning::new(
+                what,
+                format!("{} = {value} is negative; kept as written", term.name()),
+            ));
+        }
+        joint.terms[term as usize] = value;
+    }
+    for term in &entry.identify {
+        let name = term.get_ref();
+        let Some(known) = JointTerm::ALL.into_iter().find(|t| t.name() == name) else {
+            let all = JointTerm::ALL.map(JointTerm::name);
+            return Err(source.error(
+                term.span().start,
+                what,
+                format!(
+                    "identify has no term `{name}`; its terms are {}",
+                    all.join(", ")
+                ),
+            ));
+        };
+        joint.identify[known as usize] = true;
+    }
+    Ok(())
+}

@@ -1,0 +1,158 @@
+//! URDF: from the text of a file to a [`Robot`].
+//!
+//! [`Urdf::parse`] reads links and joints as they are written, with the line each stands on;
+//! [`Urdf::robot`] turns them into a tree of moving bodies:
+//!
+//! * fixed joints, and joints held by `lock`, merge the child link into its parent: its inertia is
+//!   moved there and its name kept in [`Body::merged`](super::Body::merged);
+//! * a `mimic` joint moves its body with another coordinate, chains of mimics included;
+//! * coordinates keep the order in which their joints appear in the file; bodies are sorted
+//!   parents before children;
+//! * the inertia of links that do not move is ignored.
+//!
+//! Meshes, transmissions, sensors and simulator extensions are skipped. What is imperfect but
+//! usable (no inertia, placeholder limits) becomes a [`Warning`]; what is contradictory is an
+//! error with file, line, link or joint, and what to do. Angles are kept as written: `1.5708` is
+//! not taken for a right angle.
+
+mod drive;
+mod limits;
+mod read;
+mod tree;
+
+use super::{Inertia, Robot};
+use crate::error::{Result, Warning};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Largest number of moving joints, mimic joints included.
+pub const MAX_MOVING_JOINTS: usize = 128;
+
+/// What a `robot.toml` says about the joints of its URDF.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// joints held fixed, by name: position in rad or m
+    pub lock: BTreeMap<String, f64>,
+    /// limits that replace those of the URDF, by joint name
+    pub limits: BTreeMap<String, StatedLimits>,
+}
+
+/// Limits that replace those of the URDF; `None` keeps the URDF's.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StatedLimits {
+    /// lower and upper position, rad or m
+    pub position: Option<[f64; 2]>,
+    /// rad/s or m/s
+    pub velocity: Option<f64>,
+    /// N m or N
+    pub effort: Option<f64>,
+}
+
+/// A URDF as it is written: links and joints in document order, numbers checked, nothing merged.
+#[derive(Debug, Clone)]
+pub struct Urdf {
+    /// `name` of `<robot>`; empty where it has none
+    pub name: String,
+    file: PathBuf,
+    links: Vec<Link>,
+    joints: Vec<UrdfJoint>,
+    warnings: Vec<Warning>,
+}
+
+impl Urdf {
+    /// Reads the text of a URDF; `file` is what errors call it.
+    ///
+    /// # Errors
+    /// Malformed XML, an unexpanded xacro, a root other than `<robot>`, missing or duplicate
+    /// names, a joint without type, parent or child, numbers that are not finite.
+    pub fn parse(text: &str, file: &Path) -> Result<Self> {
+        read::read(text, file)
+    }
+
+    /// The tree of moving bodies, with the standard gravity and no joint columns to identify.
+    ///
+    /// # Errors
+    /// Not a tree (several roots, a cycle, a link with two parents, an unknown link), a joint that
+    /// cannot be represented (planar, floating), mimics in a circle, contradictory limits, no
+    /// moving joint, or more than [`MAX_MOVING_JOINTS`].
+    pub fn robot(&self, options: &Options) -> Result<Robot> {
+        tree::build(self, options)
+    }
+
+    /// Names of all joints, in document order.
+    pub fn joint_names(&self) -> impl Iterator<Item = &str> {
+        self.joints.iter().map(|j| j.name.as_str())
+    }
+
+    /// Whether a joint of this name is declared `fixed`; `None` where there is no such joint.
+    pub fn is_fixed(&self, joint: &str) -> Option<bool> {
+        let joint = self.joints.iter().find(|j| j.name == joint)?;
+        Some(joint.kind == Kind::Fixed)
+    }
+
+    /// The joint that this one mimics according to the file.
+    pub fn mimics(&self, joint: &str) -> Option<&str> {
+        let joint = self.joints.iter().find(|j| j.name == joint)?;
+        joint.mimic.as_ref().map(|m| m.joint.as_str())
+    }
+}
+
+/// `<link>`.
+#[derive(Debug, Clone)]
+struct Link {
+    name: String,
+    line: usize,
+    /// about the origin and in the axes of the link frame; `None` without `<inertial>`
+    inertia: Option<Inertia>,
+    /// to be reported if the link turns out to move
+    warnings: Vec<Warning>,
+}
+
+/// `type` of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Revolute,
+    Continuous,
+    Prismatic,
+    Fixed,
+    Planar,
+    Floating,
+}
+
+/// `<joint>`.
+#[derive(Debug, Clone)]
+struct UrdfJoint {
+    name: String,
+    line: usize,
+    kind: Kind,
+    parent: String,
+    child: String,
+    rotation: Matrix3<f64>,
+    position: Vector3<f64>,
+    /// unit length
+    axis: Vector3<f64>,
+    limit: Option<Limit>,
+    mimic: Option<Mimic>,
+    damping: f64,
+    friction: f64,
+}
+
+/// `<limit>`, as written.
+#[derive(Debug, Clone, Copy)]
+struct Limit {
+    line: usize,
+    lower: Option<f64>,
+    upper: Option<f64>,
+    velocity: Option<f64>,
+    effort: Option<f64>,
+}
+
+/// `<mimic>`: `q = multiplier · q_joint + offset`.
+#[derive(Debug, Clone)]
+struct Mimic {
+    line: usize,
+    joint: String,
+    multiplier: f64,
+    offset: f64,
+}

@@ -1,0 +1,129 @@
+//! Limits of a coordinate from `<limit>`, what `robot.toml` states instead, and its mimics.
+
+use super::{Kind, StatedLimits, UrdfJoint};
+use crate::error::{Error, Result, Warning};
+use crate::robot::Limits;
+use std::path::Path;
+
+/// Limits of a moving joint. Absent limits, and the zeros that exporters write for them, mean
+/// "none" and are reported, unless `stated` gives a value.
+pub(super) fn of_joint(
+    file: &Path,
+    joint: &UrdfJoint,
+    stated: &StatedLimits,
+    warnings: &mut Vec<Warning>,
+) -> Result<Limits> {
+    let what = format!("joint `{}`", joint.name);
+    let error = |message: String| {
+        let line = joint.limit.map_or(joint.line, |l| l.line);
+        Err(Error::file(file, format!("line {line}: {what}"), message))
+    };
+    let mut limits = Limits::default();
+    let mut missing = Vec::new();
+    if let Some(position) = stated.position {
+        limits.position = position;
+    } else if joint.kind != Kind::Continuous {
+        let ends = joint.limit.map_or((None, None), |l| (l.lower, l.upper));
+        match (ends.0.unwrap_or(0.0), ends.1.unwrap_or(0.0)) {
+            (0.0, 0.0) => missing.push("position"),
+            (lower, upper) if lower > upper => {
+                return error(format!(
+                    "lower limit {lower} is above upper limit {upper}; \
+                     correct them or state `position` in robot.toml"
+                ));
+            }
+            (lower, upper) if lower == upper => {
+                return error(format!(
+                    "both limits are {lower}: it cannot move; \
+                     correct them, make it fixed, or `lock` it in robot.toml"
+                ));
+            }
+            (lower, upper) => {
+                limits.position = [lower, upper];
+                if ends.0.is_none() || ends.1.is_none() {
+                    let end = if ends.0.is_none() { "lower" } else { "upper" };
+                    warnings.push(Warning::new(
+                        &what,
+                        format!("<limit> has no {end} position; taken as 0, as URDF defines"),
+                    ));
+                }
+            }
+        }
+    }
+    let written = |stated: Option<f64>, urdf: Option<f64>, name: &'static str| match stated {
+        Some(value) => Ok(Some(value)),
+        None => match urdf {
+            Some(value) if value < 0.0 => Err(format!(
+                "its {name} limit is {value}; correct the sign or state `{name}` in robot.toml"
+            )),
+            Some(value) if value > 0.0 => Ok(Some(value)),
+            _ => Ok(None),
+        },
+    };
+    match written(
+        stated.velocity,
+        joint.limit.and_then(|l| l.velocity),
+        "velocity",
+    ) {
+        Ok(Some(value)) => limits.velocity = value,
+        Ok(None) => missing.push("velocity"),
+        Err(message) => return error(message),
+    }
+    match written(stated.effort, joint.limit.and_then(|l| l.effort), "effort") {
+        Ok(Some(value)) => limits.effort = value,
+        Ok(None) => missing.push("effort"),
+        Err(message) => return error(message),
+    }
+    if !missing.is_empty() {
+        warnings.push(Warning::new(
+            &what,
+            format!(
+                "no limit of {} in the URDF (absent or 0); taken as unlimited, \
+                 state it in robot.toml",
+                missing.join(", ")
+            ),
+        ));
+    }
+    Ok(limits)
+}
+
+/// Narrows the limits of a coordinate to what a body that follows it as `q = ratio·q_c + offset`
+/// permits, except those that `robot.toml` states. Position limits of the follower that leave no
+/// room are reported and not applied.
+pub(super) fn narrow(
+    limits: &mut Limits,
+    leader: &str,
+    stated: &StatedLimits,
+    follower: &UrdfJoint,
+    (ratio, offset): (f64, f64),
+    warnings: &mut Vec<Warning>,
+) {
+    let Some(limit) = follower.limit else { return };
+    let velocity = limit.velocity.filter(|v| *v > 0.0);
+    if let (Some(velocity), None) = (velocity, stated.velocity) {
+        limits.velocity = limits.velocity.min(velocity / ratio.abs());
+    }
+    let (Some(lower), Some(upper)) = (limit.lower, limit.upper) else {
+        return;
+    };
+    if stated.position.is_some()
+        || follower.kind == Kind::Continuous
+        || (lower == 0.0 && upper == 0.0)
+    {
+        return;
+    }
+    let (a, b) = ((lower - offset) / ratio, (upper - offset) / ratio);
+    let lower = limits.position[0].max(a.min(b));
+    let upper = limits.position[1].min(a.max(b));
+    if lower < upper {
+        limits.position = [lower, upper];
+    } else {
+        warnings.push(Warning::new(
+            format!("joint `{}`", follower.name),
+            format!(
+                "its position limits contradict those of `{leader}`, which it mimics; \
+                 those of `{leader}` are used"
+            ),
+        ));
+    }
+}

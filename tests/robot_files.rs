@@ -1,0 +1,815 @@
+//! Robot files: every bad one ends in one message that says where and what to do.
+
+use excite::robot::{JointTerm, Prior};
+use excite::{Error, Robot};
+use proptest::prelude::*;
+
+const BAR: &str = r#"<inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>"#;
+
+/// A two-joint arm with one line per element; `edit` changes its text.
+fn arm(edit: impl Fn(String) -> String) -> String {
+    edit(format!(
+        r#"<?xml version="1.0"?>
+<robot name="arm">
+<link name="base"/>
+<link name="upper">{BAR}</link>
+<link name="lower">{BAR}</link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="3" effort="40"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/><limit lower="-1" upper="2.5" velocity="4" effort="20"/></joint>
+</robot>
+"#
+    ))
+}
+
+fn replaced(from: &str, to: &str) -> String {
+    arm(|text| {
+        assert!(text.contains(from), "the test replaces nothing: {from}");
+        text.replacen(from, to, 1)
+    })
+}
+
+fn urdf_error(text: &str) -> String {
+    match Robot::from_urdf_str(text, "arm.urdf") {
+        Ok(_) => panic!("accepted:\n{text}"),
+        Err(e) => {
+            assert!(!e.is_argument());
+            e.to_string()
+        }
+    }
+}
+
+#[track_caller]
+fn contains_all(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+    assert!(!message.contains('\n'), "more than one line: {message}");
+}
+
+#[test]
+fn the_unedited_arm_is_read_without_warning() {
+    let robot = Robot::from_urdf_str(&arm(|t| t), "arm.urdf").unwrap();
+    assert_eq!(robot.name, "arm");
+    assert_eq!(robot.joint_names(), ["shoulder", "elbow"]);
+    assert_eq!(robot.joints[1].limits.position, [-1.0, 2.5]);
+    assert_eq!(robot.joints[0].limits.velocity, 3.0);
+    assert_eq!(robot.joints[0].limits.effort, 40.0);
+    assert!(robot.joints[0].limits.acceleration.is_infinite());
+    assert_eq!(robot.gravity.as_slice(), [0.0, 0.0, -9.81]);
+    assert_eq!(robot.prior, Prior::Cad);
+    assert!(robot.warnings.is_empty(), "{:?}", robot.warnings);
+    assert_eq!(robot.hash.len(), 64);
+    assert!(robot.path.is_none());
+}
+
+#[test]
+fn urdf_errors_say_where_and_what_to_do() {
+    let limit = r#"<limit lower="-2" upper="2" velocity="3" effort="40"/>"#;
+    let axis = r#"<axis xyz="0 1 0"/>"#;
+    let mimic = |joint: &str| format!(r#"{axis}<mimic joint="{joint}"/>"#);
+    let cases: Vec<(String, &[&str])> = vec![
+        (String::new(), &["arm.urdf", "empty"]),
+        (" \n ".into(), &["empty"]),
+        ("hello".into(), &["not XML", "<robot"]),
+        (
+            "<sdf version=\"1.6\"/>".into(),
+            &["line 1", "<robot>", "SDF", "convert"],
+        ),
+        ("<html></html>".into(), &["<html>", "<robot>"]),
+        ("<robot name=\"r\"/>".into(), &["no <link>"]),
+        (
+            "<robot name=\"r\"><link name=\"a\"/></robot>".into(),
+            &["no joint moves", "revolute"],
+        ),
+        (replaced("</robot>", ""), &["malformed XML"]),
+        (
+            replaced("<link name=\"upper\">", "<link name=upper>"),
+            &["line 4", "malformed XML"],
+        ),
+        (
+            replaced("<robot", "<!DOCTYPE robot [<!ENTITY a \"b\">]><robot"),
+            &["DOCTYPE"],
+        ),
+        (
+            replaced("<link name=\"base\"/>", "<xacro:macro name=\"m\"/>"),
+            &["xacro", "run"],
+        ),
+        (
+            replaced(
+                "<robot name=\"arm\">",
+                "<robot name=\"arm\" xmlns:xacro=\"http://wiki.ros.org/xacro\"><xacro:property name=\"l\" value=\"1\"/>",
+            ),
+            &["line 2", "xacro"],
+        ),
+        (
+            replaced("value=\"2\"", "value=\"${m}\""),
+            &["line 4", "xacro"],
+        ),
+        (
+            replaced("link name=\"base\"", "link"),
+            &["line 3", "<link>", "`name`"],
+        ),
+        (
+            replaced("name=\"lower\"", "name=\"upper\""),
+            &["line 5", "link `upper`", "line 4", "rename"],
+        ),
+        (
+            replaced("name=\"elbow\"", "name=\"shoulder\""),
+            &["line 7", "joint `shoulder`", "rename"],
+        ),
+        (
+            replaced("type=\"revolute\"", ""),
+            &["line 6", "joint `shoulder`", "no `type`", "revolute"],
+        ),
+        (
+            replaced("type=\"revolute\"", "type=\"hinge\""),
+            &["`hinge`", "prismatic"],
+        ),
+        (
+            replaced("\"revolute\"", "\"planar\""),
+            &["`shoulder`", "planar", "lock"],
+        ),
+        (
+            replaced("\"revolute\"", "\"floating\""),
+            &["`shoulder`", "floating", "lock"],
+        ),
+        (
+            replaced("<parent link=\"base\"/>", ""),
+            &["`shoulder`", "no parent", "<parent link"],
+        ),
+        (
+            replaced("<child link=\"lower\"/>", "<child/>"),
+            &["`elbow`", "no child"],
+        ),
+        (
+            replaced("<child link=\"lower\"/>", "<child link=\"lover\"/>"),
+            &["line 7", "`lover`", "does not exist"],
+        ),
+        (
+            replaced("<parent link=\"upper\"/>", "<parent link=\"lower\"/>"),
+            &["`elbow`", "same link"],
+        ),
+        (
+            replaced("<child link=\"lower\"/>", "<child link=\"upper\"/>"),
+            &["`elbow`", "same link"],
+        ),
+        (
+            replaced(
+                "</robot>",
+                "<joint name=\"loop\" type=\"fixed\"><parent link=\"base\"/><child link=\"lower\"/></joint></robot>",
+            ),
+            &["line 8", "`loop`", "`lower`", "`elbow`", "tree"],
+        ),
+        (
+            replaced("</robot>", "<link name=\"x\"/></robot>"),
+            &["2 links", "`base`", "`x` (line 8)", "fixed"],
+        ),
+        (
+            replaced(
+                "</robot>",
+                "<joint name=\"back\" type=\"fixed\"><parent link=\"lower\"/><child link=\"base\"/></joint></robot>",
+            ),
+            &["cycle"],
+        ),
+        (
+            replaced(
+                "</robot>",
+                "<link name=\"x\"/><link name=\"y\"/><joint name=\"a\" type=\"fixed\"><parent link=\"x\"/><child link=\"y\"/></joint><joint name=\"b\" type=\"fixed\"><parent link=\"y\"/><child link=\"x\"/></joint></robot>",
+            ),
+            &["line 8", "`x`", "cycle", "`base`"],
+        ),
+        (
+            replaced(axis, "<axis xyz=\"0 0 0\"/>"),
+            &["line 6", "`shoulder`", "axis is zero"],
+        ),
+        (
+            replaced(axis, "<axis xyz=\"0 1\"/>"),
+            &["`xyz=\"0 1\"`", "three finite numbers"],
+        ),
+        (
+            replaced(axis, "<axis xyz=\"0 1 0 0\"/>"),
+            &["three finite numbers"],
+        ),
+        (
+            replaced(axis, "<axis xyz=\"0, 1, 0\"/>"),
+            &["three finite numbers", "spaces"],
+        ),
+        (
+            replaced(axis, "<axis xyz=\"0 nan 0\"/>"),
+            &["three finite numbers"],
+        ),
+        (
+            replaced("0 0 0.4", "0 0 inf"),
+            &["`elbow`", "<origin>", "three finite numbers"],
+        ),
+        (
+            replaced("xyz=\"0 0 0.4\"", "rpy=\"0 0\""),
+            &["`rpy=\"0 0\"`", "three finite numbers"],
+        ),
+        (
+            replaced("value=\"2\"", "value=\"NaN\""),
+            &["line 4", "link `upper`", "not finite"],
+        ),
+        (
+            replaced("value=\"2\"", "value=\"two\""),
+            &["`value=\"two\"`", "not a number"],
+        ),
+        (
+            replaced("ixx=\"0.02\"", "ixx=\"1e999\""),
+            &["link `upper`", "not finite"],
+        ),
+        (
+            replaced(
+                "value=\"2\"/>",
+                "value=\"1e300\"/><origin xyz=\"1e300 0 0\"/>",
+            ),
+            &["link `upper`", "overflows"],
+        ),
+        (
+            replaced("velocity=\"3\"", "velocity=\"-3\""),
+            &["line 6", "velocity", "-3", "sign"],
+        ),
+        (
+            replaced("effort=\"40\"", "effort=\"-40\""),
+            &["effort", "-40", "sign"],
+        ),
+        (
+            replaced("effort=\"40\"", "effort=\"lots\""),
+            &["<limit>", "not a number"],
+        ),
+        (
+            replaced("lower=\"-2\"", "lower=\"3\""),
+            &["`shoulder`", "3 is above", "2", "position"],
+        ),
+        (
+            replaced("lower=\"-2\"", "lower=\"2\""),
+            &["`shoulder`", "cannot move", "lock"],
+        ),
+        (
+            replaced(axis, &format!("{axis}<mimic/>")),
+            &["`shoulder`", "<mimic>", "joint="],
+        ),
+        (
+            replaced(axis, &mimic("wrist")),
+            &["`shoulder`", "`wrist`", "does not exist"],
+        ),
+        (
+            replaced(axis, &mimic("shoulder")),
+            &["`shoulder`", "mimics itself"],
+        ),
+        (
+            replaced(axis, &mimic("elbow"))
+                .replace("0.4\"/><axis", "0.4\"/><mimic joint=\"shoulder\"/><axis"),
+            &["mimics itself", "circle"],
+        ),
+        (
+            replaced(
+                axis,
+                &format!("{axis}<mimic joint=\"elbow\" multiplier=\"inf\"/>"),
+            ),
+            &["multiplier", "not finite"],
+        ),
+        (
+            arm(|t| t.replace("\"revolute\"", "\"fixed\"")),
+            &["no joint moves"],
+        ),
+    ];
+    assert!(arm(|t| t).contains(limit));
+    for (text, parts) in cases {
+        let message = urdf_error(&text);
+        contains_all(&message, parts);
+        contains_all(&message, &["arm.urdf"]);
+    }
+}
+
+#[test]
+fn imperfect_urdfs_are_read_with_a_warning() {
+    let limit = r#"<limit lower="-2" upper="2" velocity="3" effort="40"/>"#;
+    let inertia = r#"<inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/>"#;
+    let cases: Vec<(String, &str, &[&str])> = vec![
+        (
+            replaced(limit, ""),
+            "joint `shoulder`",
+            &["position, velocity, effort", "unlimited"],
+        ),
+        (
+            replaced(limit, "<limit/>"),
+            "joint `shoulder`",
+            &["position, velocity, effort"],
+        ),
+        (
+            replaced(
+                limit,
+                "<limit lower=\"0\" upper=\"0\" velocity=\"0\" effort=\"0\"/>",
+            ),
+            "joint `shoulder`",
+            &["position, velocity, effort", "absent or 0"],
+        ),
+        (
+            replaced("velocity=\"3\"", "velocity=\"0\""),
+            "joint `shoulder`",
+            &["limit of velocity in"],
+        ),
+        (
+            replaced("lower=\"-2\" ", ""),
+            "joint `shoulder`",
+            &["no lower position", "0"],
+        ),
+        (
+            replaced(BAR, ""),
+            "link `upper`",
+            &["no <inertial>", "massless"],
+        ),
+        (
+            replaced(BAR, "<inertial><mass value=\"0\"/></inertial>"),
+            "link `upper`",
+            &["<inertial> is zero"],
+        ),
+        (replaced(inertia, ""), "link `upper`", &["point mass"]),
+        (
+            replaced("<mass value=\"2\"/>", ""),
+            "link `upper`",
+            &["no <mass"],
+        ),
+        (
+            replaced("value=\"2\"", "value=\"0\""),
+            "link `upper`",
+            &["no mass", "cannot exist"],
+        ),
+        (
+            replaced("value=\"2\"", "value=\"-2\""),
+            "link `upper`",
+            &["-2 kg"],
+        ),
+        (
+            replaced("ixx=\"0.02\"", "ixx=\"-0.02\""),
+            "link `upper`",
+            &["negative principal moment"],
+        ),
+        (
+            replaced("ixx=\"0.02\"", "ixx=\"0.05\""),
+            "link `upper`",
+            &["exceeds the sum", "20.0 %"],
+        ),
+        (replaced("ixy=\"0\" ", ""), "link `upper`", &["lacks ixy"]),
+        (
+            replaced("<axis", "<dynamics damping=\"-1\"/><axis"),
+            "joint `shoulder`",
+            &["negative damping"],
+        ),
+        (
+            replaced("<axis", "<axis xyz=\"1 0 0\"/><axis"),
+            "joint `shoulder`",
+            &["<axis> is given twice"],
+        ),
+    ];
+    for (text, subject, parts) in cases {
+        let robot = Robot::from_urdf_str(&text, "arm.urdf").unwrap();
+        let warning = robot
+            .warnings
+            .iter()
+            .find(|w| w.subject == subject && parts.iter().all(|p| w.message.contains(p)));
+        assert!(warning.is_some(), "{parts:?} not in {:?}", robot.warnings);
+    }
+    // the rounding of published figures is not worth a word
+    let robot = Robot::from_urdf_str(&replaced("ixx=\"0.02\"", "ixx=\"0.04001\""), "a").unwrap();
+    assert!(robot.warnings.is_empty(), "{:?}", robot.warnings);
+}
+
+#[test]
+fn what_is_not_needed_is_skipped_silently() {
+    let extra = r#"<gazebo reference="upper"><selfCollide>true</selfCollide></gazebo>
+<transmission name="t"><joint name="shoulder"/><actuator name="m"/></transmission>
+<material name="grey"><color rgba="1 1 1 1"/></material></robot>"#;
+    let visual = r#"<link name="upper"><visual><geometry><mesh filename="package://a/b.stl"/></geometry><origin xyz="a b c"/></visual>"#;
+    let text = arm(|t| {
+        t.replace("</robot>", extra)
+            .replace("<link name=\"upper\">", visual)
+    });
+    let expanded = text.replace(
+        "name=\"arm\"",
+        "name=\"arm\" xmlns:xacro=\"http://wiki.ros.org/xacro\"",
+    );
+    let robot =
+        Robot::from_urdf_str(&format!("\u{feff}{}", expanded.trim_start()), "arm.urdf").unwrap();
+    assert_eq!(robot.dof(), 2);
+    assert!(robot.warnings.is_empty(), "{:?}", robot.warnings);
+}
+
+/// `links` links in a row, joined by joints of this type.
+fn chain(links: usize, kind: &str) -> String {
+    chain_with(links, kind, |_| String::new())
+}
+
+/// The same with more in each joint; the first is always revolute.
+fn chain_with(links: usize, kind: &str, more: impl Fn(usize) -> String) -> String {
+    let mut text = String::from("<robot name=\"chain\"><link name=\"l0\"/>\n");
+    for i in 1..links {
+        let (parent, more) = (i - 1, more(i));
+        let kind = if i == 1 { "revolute" } else { kind };
+        text += &format!(
+            r#"<link name="l{i}"><inertial><mass value="1"/></inertial></link><joint name="j{i}" type="{kind}"><parent link="l{parent}"/><child link="l{i}"/><origin xyz="0 0 0.001"/>{more}</joint>
+"#
+        );
+    }
+    text + "</robot>"
+}
+
+#[test]
+fn long_chains_neither_overflow_nor_are_accepted_silently() {
+    assert_eq!(
+        Robot::from_urdf_str(&chain(129, "revolute"), "c")
+            .unwrap()
+            .dof(),
+        128
+    );
+    contains_all(
+        &urdf_error(&chain(301, "revolute")),
+        &["300 joints move", "128", "lock"],
+    );
+    contains_all(
+        &urdf_error(&chain(100_000, "revolute")),
+        &["99999 joints move"],
+    );
+    let merged = Robot::from_urdf_str(&chain(100_000, "fixed"), "c").unwrap();
+    assert_eq!(merged.bodies.len(), 1);
+    assert_eq!(merged.bodies[0].merged.len(), 99_998);
+    assert!((merged.bodies[0].inertia.mass() - 99_999.0).abs() < 1e-6);
+    // every joint follows the next one: resolved from the far end
+    let mimics = chain_with(100_000, "revolute", |i| match i {
+        99_999 => String::new(),
+        _ => format!("<mimic joint=\"j{}\"/>", i + 1),
+    });
+    contains_all(&urdf_error(&mimics), &["99999 joints move"]);
+    let deep = format!("<robot name=\"d\">{}", "<a>".repeat(50_000));
+    contains_all(&urdf_error(&deep), &["malformed XML"]);
+    let deep = format!(
+        "<robot name=\"d\">{}{}</robot>",
+        "<a>".repeat(50_000),
+        "</a>".repeat(50_000)
+    );
+    contains_all(&urdf_error(&deep), &["no <link>"]);
+}
+
+const TOML: &str = r#"name = "test arm"
+urdf = "arm.urdf"
+gravity = [0, 9.81, 0.0]
+prior = "identified"
+
+[[joint]]
+name = "elbow"
+position = [-0.5, 1.5]
+velocity = 1
+acceleration = 15.0
+jerk = 7500.0
+effort = 87.0
+torque_noise = 0.08
+position_resolution = 2.4e-5
+gear_ratio = 100
+armature = 0.1
+viscous = 0.2
+coulomb = 0.3
+offset = -0.4
+identify = ["offset", "viscous"]
+"#;
+
+#[test]
+fn a_robot_toml_sets_what_it_states() {
+    let robot = Robot::from_toml_str(TOML, &arm(|t| t), "robot.toml").unwrap();
+    assert_eq!(robot.name, "test arm");
+    assert_eq!(robot.gravity.as_slice(), [0.0, 9.81, 0.0]);
+    assert_eq!(robot.prior, Prior::Identified);
+    let elbow = &robot.joints[1];
+    assert_eq!(elbow.limits.position, [-0.5, 1.5]);
+    let l = &elbow.limits;
+    assert_eq!(
+        [l.velocity, l.acceleration, l.jerk, l.effort],
+        [1.0, 15.0, 7500.0, 87.0]
+    );
+    assert_eq!(elbow.torque_noise, Some(0.08));
+    assert_eq!(elbow.position_resolution, Some(2.4e-5));
+    assert_eq!(elbow.gear_ratio, Some(100.0));
+    assert_eq!(elbow.terms, [0.1, 0.2, 0.3, -0.4]);
+    assert_eq!(elbow.identify, [false, true, false, true]);
+    assert_eq!(robot.joints[0].limits.position, [-2.0, 2.0]);
+    assert_eq!(robot.joints[0].identify, [false; 4]);
+    assert!(robot.warnings.is_empty(), "{:?}", robot.warnings);
+}
+
+#[test]
+fn a_robot_toml_replaces_missing_and_contradictory_limits() {
+    let limit = r#"<limit lower="-1" upper="2.5" velocity="4" effort="20"/>"#;
+    for bad in [
+        "",
+        "<limit lower=\"3\" upper=\"2\" velocity=\"-1\" effort=\"-1\"/>",
+    ] {
+        let robot = Robot::from_toml_str(TOML, &replaced(limit, bad), "robot.toml").unwrap();
+        assert_eq!(robot.joints[1].limits.position, [-0.5, 1.5]);
+        assert!(robot.warnings.is_empty(), "{:?}", robot.warnings);
+    }
+}
+
+#[test]
+fn toml_errors_say_where_and_what_to_do() {
+    let edit = |from: &str, to: &str| {
+        assert!(TOML.contains(from), "the test replaces nothing: {from}");
+        TOML.replacen(from, to, 1)
+    };
+    let cases: Vec<(String, &[&str])> = vec![
+        ("name = ".into(), &["line 1"]),
+        (edit("jerk", "jrek"), &["line 11", "`jrek`", "`jerk`"]),
+        (edit("gravity", "gravty"), &["line 3", "`gravty`"]),
+        (
+            edit("prior", "mechanism"),
+            &["mechanism", "parallel mechanisms: not supported"],
+        ),
+        (
+            edit("\"identified\"", "\"guess\""),
+            &["line 4", "guess", "cad"],
+        ),
+        (
+            edit("\"elbow\"", "\"elbov\""),
+            &["line 7", "`elbov`", "did you mean `elbow`", "shoulder"],
+        ),
+        (edit("name = \"elbow\"\n", ""), &["line 6", "name"]),
+        (
+            format!("{TOML}[[joint]]\nname = \"elbow\"\n"),
+            &["line 22", "`elbow`", "two"],
+        ),
+        (
+            edit("[-0.5, 1.5]", "[1.5, -0.5]"),
+            &["line 8", "`elbow`", "lower < upper"],
+        ),
+        (edit("[-0.5, 1.5]", "[1.5, 1.5]"), &["lower < upper"]),
+        (edit("[-0.5, 1.5]", "[nan, 1.5]"), &["lower < upper"]),
+        (edit("[-0.5, 1.5]", "[0.5]"), &["line 8", "two numbers"]),
+        (edit("[-0.5, 1.5]", "0.5"), &["line 8"]),
+        (
+            edit("[-0.5, 1.5]", "[0.5, 1.0, 2.0]"),
+            &["line 8", "two numbers"],
+        ),
+        (
+            edit("velocity = 1", "velocity = -1"),
+            &["line 9", "velocity = -1", "positive"],
+        ),
+        (
+            edit("velocity = 1", "velocity = nan"),
+            &["velocity = NaN", "positive"],
+        ),
+        (edit("velocity = 1", "velocity = \"1\""), &["line 9"]),
+        (
+            edit("acceleration = 15.0", "acceleration = 0"),
+            &["line 10", "acceleration", "positive"],
+        ),
+        (edit("jerk = 7500.0", "jerk = -1"), &["jerk", "positive"]),
+        (
+            edit("effort = 87.0", "effort = -1"),
+            &["effort", "positive"],
+        ),
+        (
+            edit("torque_noise = 0.08", "torque_noise = inf"),
+            &["line 13", "torque_noise", "finite"],
+        ),
+        (edit("2.4e-5", "0"), &["position_resolution", "positive"]),
+        (
+            edit("gear_ratio = 100", "gear_ratio = 0"),
+            &["gear_ratio", "not 0"],
+        ),
+        (
+            edit("armature = 0.1", "armature = nan"),
+            &["armature", "finite"],
+        ),
+        (
+            edit("\"viscous\"]", "\"viscosity\"]"),
+            &["line 20", "`viscosity`", "armature, viscous"],
+        ),
+        (
+            edit("[0, 9.81, 0.0]", "[0, 9.81]"),
+            &["line 3", "three finite numbers"],
+        ),
+        (
+            edit("[0, 9.81, 0.0]", "[0, 9.81, 0, 0]"),
+            &["line 3", "three finite numbers"],
+        ),
+        (
+            edit("[0, 9.81, 0.0]", "[0, 9.81, inf]"),
+            &["line 3", "gravity", "finite"],
+        ),
+        (
+            edit("prior = \"identified\"", "lock = { wrist = 0.0 }"),
+            &["line 4", "lock", "`wrist`", "elbow"],
+        ),
+        (
+            edit("prior = \"identified\"", "lock = { shoulder = nan }"),
+            &["line 4", "lock", "finite"],
+        ),
+        (
+            edit(
+                "prior = \"identified\"",
+                "lock = { elbow = 0, shoulder = 0 }",
+            ),
+            &["no joint moves"],
+        ),
+    ];
+    for (toml, parts) in cases {
+        match Robot::from_toml_str(&toml, &arm(|t| t), "robot.toml") {
+            Ok(_) => panic!("accepted:\n{toml}"),
+            Err(e) => contains_all(&e.to_string(), parts),
+        }
+    }
+    let fixed = arm(|t| t.replacen("\"elbow\" type=\"revolute\"", "\"elbow\" type=\"fixed\"", 1));
+    let e = Robot::from_toml_str(TOML, &fixed, "robot.toml").unwrap_err();
+    contains_all(&e.to_string(), &["robot.toml", "line 7", "fixed", "remove"]);
+    let mimic = arm(|t| t.replacen("0.4\"/>", "0.4\"/><mimic joint=\"shoulder\"/>", 1));
+    let e = Robot::from_toml_str(TOML, &mimic, "robot.toml").unwrap_err();
+    contains_all(&e.to_string(), &["line 7", "mimics `shoulder`"]);
+}
+
+#[test]
+fn loading_tells_files_bundled_names_and_nothing_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_string();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
+    let error = |spec: &str| Robot::load(spec).map(|r| r.name).unwrap_err();
+    write("arm.urdf", arm(|t| t).as_bytes());
+    write("robot.toml", TOML.as_bytes());
+
+    let robot = Robot::load(&at("robot.toml")).unwrap();
+    assert_eq!(
+        robot.path.as_deref(),
+        Some(dir.path().join("robot.toml").as_path())
+    );
+    let both = Robot::from_toml_str(TOML, &arm(|t| t), "robot.toml").unwrap();
+    assert_eq!(robot.hash, both.hash);
+    let bare = Robot::load(&at("arm.urdf")).unwrap();
+    assert_ne!(bare.hash, robot.hash);
+    assert_eq!(bare.name, "arm");
+    assert_eq!(Robot::load("panda").unwrap().dof(), 7);
+
+    write(
+        "nameless.urdf",
+        arm(|t| t.replace("<robot name=\"arm\">", "<robot>")).as_bytes(),
+    );
+    assert_eq!(Robot::load(&at("nameless.urdf")).unwrap().name, "nameless");
+    write("pipe", arm(|t| t).as_bytes());
+    assert_eq!(Robot::load(&at("pipe")).unwrap().dof(), 2);
+
+    let e = error("pnada");
+    assert!(e.is_argument());
+    contains_all(
+        &e.to_string(),
+        &["`pnada`", "neither", "did you mean `panda`", "ur10e"],
+    );
+    assert!(!error("something_else").to_string().contains("did you mean"));
+    assert!(error("").is_argument());
+    assert!(matches!(error("absent.urdf"), Error::Io { .. }));
+    assert!(matches!(error(&at("absent")), Error::Io { .. }));
+    assert!(error("a\0b").is_argument());
+    contains_all(&error(&at("")).to_string(), &["directory", "robot.toml"]);
+
+    write("no_urdf.toml", b"name = \"x\"\n");
+    contains_all(
+        &error(&at("no_urdf.toml")).to_string(),
+        &["no_urdf.toml", "names no URDF"],
+    );
+    write("lost.toml", b"\nurdf = \"lost.urdf\"\n");
+    contains_all(
+        &error(&at("lost.toml")).to_string(),
+        &["line 2", "lost.urdf", "relative"],
+    );
+    write("dir.toml", b"urdf = \".\"\n");
+    contains_all(
+        &error(&at("dir.toml")).to_string(),
+        &["line 1", "is a directory"],
+    );
+    write("latin.urdf", b"<robot name=\"r\">\n<!-- \xe9 -->");
+    contains_all(&error(&at("latin.urdf")).to_string(), &["line 2", "UTF-8"]);
+    write("notes.txt", b"hello");
+    contains_all(&error(&at("notes.txt")).to_string(), &[".toml or .urdf"]);
+    let huge = std::fs::File::create(dir.path().join("huge.urdf")).unwrap();
+    huge.set_len(65 << 20).unwrap();
+    contains_all(
+        &error(&at("huge.urdf")).to_string(),
+        &["huge.urdf", "64 MiB"],
+    );
+}
+
+#[test]
+fn the_template_gives_the_same_robot() {
+    let warned = arm(|t| {
+        t.replace("velocity=\"3\"", "velocity=\"0\"").replace(
+            "\"elbow\" type=\"revolute\"",
+            "\"elbow\" type=\"prismatic\"",
+        )
+    });
+    for (robot, urdf) in [
+        (
+            Robot::from_toml_str(TOML, &arm(|t| t), "robot.toml").unwrap(),
+            arm(|t| t),
+        ),
+        (Robot::from_urdf_str(&warned, "arm.urdf").unwrap(), warned),
+    ] {
+        let template = robot.to_toml_template("arm \"1\".urdf");
+        let again = Robot::from_toml_str(&template, &urdf, "robot.toml").unwrap();
+        assert_eq!(again.name, robot.name);
+        assert_eq!(again.gravity, robot.gravity);
+        assert_eq!(again.prior, robot.prior);
+        for (a, b) in again.joints.iter().zip(&robot.joints) {
+            assert_eq!(format!("{a:?}"), format!("{b:?}"));
+        }
+        for joint in &robot.joints {
+            assert!(template.contains(&format!("name = \"{}\"", joint.name)));
+        }
+        for key in [
+            "lock",
+            "torque_noise",
+            "position_resolution",
+            "gear_ratio",
+            "jerk",
+        ] {
+            assert!(template.contains(key), "{key}");
+        }
+        for term in JointTerm::ALL {
+            assert!(template.contains(&format!("{} = ", term.name())));
+        }
+    }
+}
+
+/// Any robot that is accepted has only finite numbers in its model.
+fn check(result: excite::Result<Robot>) {
+    if let Ok(robot) = result {
+        assert!(!robot.joints.is_empty());
+        for (i, body) in robot.bodies.iter().enumerate() {
+            assert!(
+                body.inertia
+                    .0
+                    .iter()
+                    .chain(&body.position)
+                    .all(|x| x.is_finite())
+            );
+            assert!((body.axis.norm() - 1.0).abs() < 1e-12);
+            assert!(body.parent.is_none_or(|p| p < i));
+            assert!(body.coordinate < robot.joints.len());
+        }
+        for joint in &robot.joints {
+            assert!(joint.limits.position[0] < joint.limits.position[1]);
+            assert!(joint.limits.velocity > 0.0 && joint.limits.effort > 0.0);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    #[test]
+    fn damaged_files_never_panic(
+        which in 0usize..3,
+        cut in 0.0f64..1.0,
+        flips in prop::collection::vec((0.0f64..1.0, any::<u8>()), 0..6),
+        truncate in any::<bool>(),
+    ) {
+        let damage = |text: &str| {
+            let mut bytes = text.as_bytes().to_vec();
+            for (at, value) in &flips {
+                let i = (at * bytes.len() as f64) as usize;
+                bytes[i] = *value;
+            }
+            if truncate {
+                bytes.truncate((cut * bytes.len() as f64) as usize);
+            }
+            String::from_utf8_lossy(&bytes).into_owned()
+        };
+        let (urdf, toml) = (arm(|t| t), TOML);
+        match which {
+            0 => check(Robot::from_urdf_str(&damage(&urdf), "damaged.urdf")),
+            1 => check(Robot::from_toml_str(&damage(toml), &urdf, "damaged.toml")),
+            _ => check(Robot::from_toml_str(toml, &damage(&urdf), "robot.toml")),
+        }
+    }
+
+    #[test]
+    fn garbage_never_panics(text in ".{0,200}", toml in "[a-z_=\\[\\]\"{}., 0-9\n-]{0,120}") {
+        check(Robot::from_urdf_str(&text, "garbage.urdf"));
+        check(Robot::from_toml_str(&text, &arm(|t| t), "garbage.toml"));
+        check(Robot::from_toml_str(&toml, &arm(|t| t), "garbage.toml"));
+        let unknown = Robot::load(&format!("no such robot {text}")).is_err();
+        prop_assert!(unknown);
+    }
+
+    #[test]
+    fn random_numbers_never_panic(
+        values in prop::collection::vec(prop::num::f64::ANY, 12),
+        multiplier in prop::num::f64::NORMAL | prop::num::f64::ZERO,
+    ) {
+        let v = |i: usize| values[i].to_string();
+        let text = arm(|t| t
+            .replacen("0 0 0.4", &format!("{} {} {}\" rpy=\"{} 0 {}", v(0), v(1), v(2), v(3), v(4)), 1)
+            .replacen("xyz=\"0 1 0\"", &format!("xyz=\"{} {} {}\"", v(5), v(6), v(7)), 1)
+            .replacen("value=\"2\"", &format!("value=\"{}\"", v(8)), 1)
+            .replacen("ixx=\"0.02\"", &format!("ixx=\"{}\"", v(9)), 1)
+            .replacen("lower=\"-2\"", &format!("lower=\"{}\"", v(10)), 1)
+            .replacen("velocity=\"3\"", &format!("velocity=\"{}\"", v(11)), 1)
+            .replacen("<child link=\"lower\"/>", &format!("<child link=\"lower\"/><mimic joint=\"shoulder\" multiplier=\"{multiplier}\"/>"), 1));
+        check(Robot::from_urdf_str(&text, "numbers.urdf"));
+    }
+}
