@@ -3,7 +3,9 @@
 #![warn(missing_docs)]
 
 pub mod error;
+pub mod output;
 pub mod robot;
+pub mod trajectory;
 
 pub use error::{Error, Result, Warning};
 pub use robot::Robot;
