@@ -4,7 +4,9 @@
 
 pub mod dynamics;
 pub mod error;
+pub mod output;
 pub mod robot;
+pub mod trajectory;
 
 pub use error::{Error, Result, Warning};
 pub use robot::Robot;

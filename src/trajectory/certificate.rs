@@ -1,0 +1,306 @@
+//! The certificate: position, velocity, acceleration and jerk limits over all time.
+
+use super::extrema::{Extremum, extrema};
+use super::fourier::Fourier;
+use super::torque::TorqueBound;
+use crate::error::{Error, Result};
+use crate::robot::Robot;
+
+/// A limit counts as kept when it is exceeded by no more than this part of its range.
+pub const TOLERANCE: f64 = 1e-9;
+
+/// The five kinds of limits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// position, rad or m
+    Position,
+    /// velocity
+    Velocity,
+    /// acceleration
+    Acceleration,
+    /// jerk
+    Jerk,
+    /// torque or force
+    Torque,
+}
+
+impl Kind {
+    /// Name as in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Position => "position",
+            Kind::Velocity => "velocity",
+            Kind::Acceleration => "acceleration",
+            Kind::Jerk => "jerk",
+            Kind::Torque => "torque",
+        }
+    }
+}
+
+/// The largest magnitude of a quantity over all time, against its limit.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Peak {
+    /// largest magnitude
+    pub value: f64,
+    /// when, s into the period
+    pub time: f64,
+    /// the magnitude exceeds this at no time (rigorous, including rounding)
+    pub bound: f64,
+    /// limit; `None` where there is none
+    pub limit: Option<f64>,
+    /// `value / limit`
+    pub used: Option<f64>,
+    /// `limit − value`
+    pub margin: Option<f64>,
+}
+
+impl Peak {
+    fn new(peak: Extremum, bound: f64, limit: f64) -> Self {
+        let limit = limit.is_finite().then_some(limit);
+        let used = limit.map(|l| {
+            if peak.value == 0.0 {
+                0.0
+            } else {
+                peak.value / l
+            }
+        });
+        let margin = limit.map(|l| l - peak.value);
+        Peak {
+            value: peak.value,
+            time: peak.time,
+            bound,
+            limit,
+            used,
+            margin,
+        }
+    }
+
+    /// Whether the bound stays within the limit.
+    pub fn satisfied(&self) -> bool {
+        match self.limit {
+            Some(limit) => self.bound <= limit * (1.0 + TOLERANCE),
+            None => self.bound.is_finite(),
+        }
+    }
+}
+
+/// Range of a joint position over all time, against its limits.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Range {
+    /// smallest position and when
+    pub min: Extremum,
+    /// largest position and when
+    pub max: Extremum,
+    /// rigorous enclosure, lower and upper
+    pub bounds: [f64; 2],
+    /// lower limit; `None` where there is none
+    pub lower: Option<f64>,
+    /// upper limit; `None` where there is none
+    pub upper: Option<f64>,
+    /// `max |q − mid| / half range`; `None` unless both limits are there
+    pub used: Option<f64>,
+    /// distance to the nearer limit, negative beyond it; `None` without limits
+    pub margin: Option<f64>,
+}
+
+impl Range {
+    /// Whether the enclosure stays within the limits.
+    pub fn satisfied(&self) -> bool {
+        let range = match (self.lower, self.upper) {
+            (Some(a), Some(b)) => b - a,
+            (Some(a), None) | (None, Some(a)) => a.abs().max(1.0),
+            (None, None) => 0.0,
+        };
+        let slack = TOLERANCE * range;
+        self.bounds[0] >= self.lower.map_or(f64::MIN, |a| a - slack)
+            && self.bounds[1] <= self.upper.map_or(f64::MAX, |b| b + slack)
+    }
+}
+
+/// What is proven of one joint.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct JointCertificate {
+    /// name of the joint
+    pub joint: String,
+    /// range of the position
+    pub position: Range,
+    /// largest speed
+    pub velocity: Peak,
+    /// largest acceleration
+    pub acceleration: Peak,
+    /// largest jerk
+    pub jerk: Peak,
+    /// largest torque, where it was asked for
+    pub torque: Option<TorqueBound>,
+}
+
+impl JointCertificate {
+    /// Kind, used fraction and whether it holds, of every limit.
+    fn verdicts(&self) -> impl Iterator<Item = (Kind, Option<f64>, bool)> {
+        let torque = self.torque.as_ref();
+        [
+            (
+                Kind::Position,
+                self.position.used,
+                self.position.satisfied(),
+            ),
+            (
+                Kind::Velocity,
+                self.velocity.used,
+                self.velocity.satisfied(),
+            ),
+            (
+                Kind::Acceleration,
+                self.acceleration.used,
+                self.acceleration.satisfied(),
+            ),
+            (Kind::Jerk, self.jerk.used, self.jerk.satisfied()),
+            (
+                Kind::Torque,
+                torque.and_then(|t| t.used),
+                torque.is_none_or(|t| t.satisfied()),
+            ),
+        ]
+        .into_iter()
+    }
+}
+
+/// The limit nearest to, or furthest beyond, exhaustion.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Worst {
+    /// name of the joint
+    pub joint: String,
+    /// which limit
+    pub kind: Kind,
+    /// fraction used
+    pub used: f64,
+}
+
+/// Proof that a motion keeps a robot's limits at all times, or where it does not.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Certificate {
+    /// joint by joint
+    pub joints: Vec<JointCertificate>,
+    /// whether every limit holds (to [`TOLERANCE`] of its range)
+    pub satisfied: bool,
+    /// the most used limit; `None` where there are no limits
+    pub worst: Option<Worst>,
+}
+
+impl Certificate {
+    fn new(joints: Vec<JointCertificate>) -> Self {
+        let mut worst: Option<Worst> = None;
+        let mut satisfied = true;
+        for joint in &joints {
+            for (kind, used, holds) in joint.verdicts() {
+                satisfied &= holds;
+                if let Some(used) = used
+                    && worst.as_ref().is_none_or(|w| used > w.used)
+                {
+                    worst = Some(Worst {
+                        joint: joint.joint.clone(),
+                        kind,
+                        used,
+                    });
+                }
+            }
+        }
+        Certificate {
+            joints,
+            satisfied,
+            worst,
+        }
+    }
+
+    /// The same certificate with the torques of [`torque_certificate`](super::torque_certificate),
+    /// one per joint.
+    pub fn with_torque(self, torque: Vec<TorqueBound>) -> Self {
+        let mut joints = self.joints;
+        for (joint, bound) in joints.iter_mut().zip(torque) {
+            joint.torque = Some(bound);
+        }
+        Certificate::new(joints)
+    }
+}
+
+/// Exact extrema of every joint's position, velocity, acceleration and jerk over all time (see
+/// [`extrema`]), compared with the robot's limits. Torques are added by
+/// [`Certificate::with_torque`].
+///
+/// # Errors
+/// [`Error::Argument`] if the trajectory is malformed or has another number of joints than the
+/// robot.
+pub fn certify(robot: &Robot, trajectory: &Fourier) -> Result<Certificate> {
+    check(robot, trajectory)?;
+    let range = |j: usize, order: u32| {
+        extrema(
+            trajectory.period,
+            &trajectory.harmonics,
+            &trajectory.joints[j],
+            order,
+        )
+    };
+    let joints = robot
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| {
+            let q = range(j, 0);
+            let [lower, upper] = joint.limits.position.map(|v| v.is_finite().then_some(v));
+            let used = lower.zip(upper).map(|(a, b)| {
+                let far = (q.max.value - 0.5 * (a + b)).max(0.5 * (a + b) - q.min.value);
+                if far == 0.0 {
+                    0.0
+                } else {
+                    far / (0.5 * (b - a))
+                }
+            });
+            let margin = match (
+                lower.map(|a| q.min.value - a),
+                upper.map(|b| b - q.max.value),
+            ) {
+                (Some(a), Some(b)) => Some(a.min(b)),
+                (a, b) => a.or(b),
+            };
+            let position = Range {
+                min: q.min,
+                max: q.max,
+                bounds: [q.lower_bound, q.upper_bound],
+                lower,
+                upper,
+                used,
+                margin,
+            };
+            let peak = |order: u32, limit: f64| {
+                let e = range(j, order);
+                Peak::new(e.largest(), e.magnitude_bound(), limit)
+            };
+            JointCertificate {
+                joint: joint.name.clone(),
+                position,
+                velocity: peak(1, joint.limits.velocity),
+                acceleration: peak(2, joint.limits.acceleration),
+                jerk: peak(3, joint.limits.jerk),
+                torque: None,
+            }
+        })
+        .collect();
+    Ok(Certificate::new(joints))
+}
+
+/// Whether the trajectory is well-formed and has the robot's joints.
+pub(super) fn check(robot: &Robot, trajectory: &Fourier) -> Result<()> {
+    if let Err((place, message)) = trajectory.check() {
+        return Err(Error::Argument(format!("trajectory, {place}: {message}")));
+    }
+    if robot.dof() != trajectory.dof() {
+        return Err(Error::Argument(format!(
+            "the trajectory has {} joints, robot {:?} has {}; use the robot it was designed for",
+            trajectory.dof(),
+            robot.name,
+            robot.dof()
+        )));
+    }
+    Ok(())
+}

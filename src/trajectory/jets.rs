@@ -1,0 +1,278 @@
+//! Norm jets: a rigorous bound of the second time derivative of every joint torque.
+//!
+//! Between two samples a distance `h` apart a smooth torque obeys `|τ(t)| ≤ max(|τ_i|, |τ_{i+1}|)
+//! + (h²/8) sup |τ̈|`, so a bound of `τ̈` turns samples into a proof. Automatic differentiation of
+//! inverse dynamics would give `τ̈` at points; what is needed here is a bound over an interval of
+//! time, given only `sup |q⁽ᵏ⁾|` of every coordinate for `k = 0 … 4`.
+//!
+//! A *norm jet* of a vector `x(t)` is a list `x_0 … x_4` with `|x⁽ᵏ⁾(t)| ≤ x_k` throughout. Jets of
+//! sums add, and Leibniz' rule with `|a × b| ≤ |a||b|` gives those of products:
+//! `(xy)_k = Σ_j C(k,j) x_j y_{k−j}`.
+//!
+//! **Frame.** The torque of joint `i` is `τ_i = a · n`, with the axis `a` constant in body `i`.
+//! Everything is therefore written in the axes of body `i`: the time derivative of the components
+//! counts only motion *relative to* body `i`, and `|τ̈_i| ≤ n_2`.
+//!
+//! **Motion of the frame**, from the base outwards, components in the axes of the body itself.
+//! `R(q)ᵀ` for a turn about a fixed axis obeys `dRᵀ/dt = −q̇ S(a) Rᵀ`, so its operator norms have
+//! the jet `e_0 = 1`, `e_{k+1} = Σ_j C(k,j) |q⁽ʲ⁺¹⁾| e_{k−j}`. With `Ω` the angular velocity and `A`
+//! the acceleration of the origin minus gravity (base: `0` and `|g|`), and `r` the origin of `i`
+//! in its parent `p`,
+//!
+//! ```text
+//! Ω_i = e Ω_p + q̇              A_i = e (A_p + D_p(r))        (revolute)
+//! Ω_i = Ω_p                    A_i = A_p + D_p(r + a q)      (prismatic)
+//! D(s) = s̈ + 2 Ω ṡ + Ω̇ s + Ω Ω s    inertial acceleration of a point s of the moving frame
+//! ```
+//!
+//! **The bodies beyond**, in the axes of `i`: `ν_b` relative angular velocity, `δ_b` a unit vector
+//! fixed in body `b` (`δ_0 = 1`, `δ_{k+1} = Σ_j C(k,j) ν_j δ_{k−j}`), `s_b` the origin of `b` seen
+//! from the origin of `i`:
+//!
+//! ```text
+//! ν_c = ν_b + δ_b q̇_c (revolute)          s_c = s_b + |r_c| δ_b  (+ δ_b q_c, prismatic)
+//! ```
+//!
+//! **Force and moment** on the subtree, with mass `m`, first moment `h` and inertia `I` of each
+//! body about its origin, `y = Σ (m s + |h| δ)`, `v = ṡ + Ω s`, `σ = Ω + ν`:
+//!
+//! ```text
+//! f = (Σ m) A + D(y)
+//! H = Σ [ m s v + |h| δ v + s σ |h| δ + I σ ]     angular momentum about the moving origin of i
+//! n = Ḣ + Ω H + y A
+//! ```
+//!
+//! where `I_0` is the largest magnitude of an eigenvalue of `I` and, since an isotropic part does
+//! not change when it turns, the derivatives grow from half the spread of the eigenvalues:
+//! `d_0 = ½(λ_max − λ_min)`, `d_{k+1} = 2 Σ_j C(k,j) ν_j d_{k−j}`, `I_k = d_k` for `k ≥ 1`. Finally
+//! `|τ̈| ≤ n_2` (revolute) or `f_2` (prismatic); joint terms add `I_a |q⁽⁴⁾| + F_v |q⁽³⁾|`, and the
+//! joints of one coordinate add with their ratios.
+
+use crate::robot::{JointTerm, Motion, Robot};
+use nalgebra::SymmetricEigen;
+
+/// Upper bounds of the norms of a vector and of its first four time derivatives.
+pub type Jet = [f64; 5];
+
+const ZERO: Jet = [0.0; 5];
+const BINOMIAL: [[f64; 5]; 5] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0, 0.0, 0.0],
+    [1.0, 2.0, 1.0, 0.0, 0.0],
+    [1.0, 3.0, 3.0, 1.0, 0.0],
+    [1.0, 4.0, 6.0, 4.0, 1.0],
+];
+
+fn sum(a: &Jet, b: &Jet) -> Jet {
+    std::array::from_fn(|k| a[k] + b[k])
+}
+
+fn scale(f: f64, a: &Jet) -> Jet {
+    a.map(|x| f * x)
+}
+
+fn product(a: &Jet, b: &Jet) -> Jet {
+    std::array::from_fn(|k| (0..=k).map(|j| BINOMIAL[k][j] * a[j] * b[k - j]).sum())
+}
+
+/// Jet of the time derivative; what would need a fifth derivative is unknown, hence infinite.
+/// Entry `k` of every operation uses only entries up to `k`, so it never spreads downwards.
+fn rate(a: &Jet) -> Jet {
+    [a[1], a[2], a[3], a[4], f64::INFINITY]
+}
+
+/// Grows `x_{k+1} = f Σ_j C(k,j) w_j x_{k−j}` from `x_0 = first`.
+fn grow(first: f64, f: f64, w: &Jet) -> Jet {
+    let mut x = [first, 0.0, 0.0, 0.0, 0.0];
+    for k in 0..4 {
+        x[k + 1] = f
+            * (0..=k)
+                .map(|j| BINOMIAL[k][j] * w[j] * x[k - j])
+                .sum::<f64>();
+    }
+    x
+}
+
+/// Jet of the inertial acceleration of a point `s` of a frame that turns with `omega`.
+fn inertial(omega: &Jet, s: &Jet) -> Jet {
+    let relative = sum(&rate(&rate(s)), &scale(2.0, &product(omega, &rate(s))));
+    let dragged = sum(
+        &product(&rate(omega), s),
+        &product(omega, &product(omega, s)),
+    );
+    sum(&relative, &dragged)
+}
+
+/// What the bound needs to know of one body.
+#[derive(Debug, Clone)]
+struct Node {
+    parent: Option<usize>,
+    revolute: bool,
+    coordinate: usize,
+    ratio: f64,
+    offset: f64,
+    /// distance of the origin from the parent's at zero joint position
+    length: f64,
+    mass: f64,
+    moment: f64,
+    /// largest magnitude of a principal moment about the origin, half their spread
+    inertia: [f64; 2],
+}
+
+/// The norms of a robot's constants, from which torque derivatives are bounded.
+#[derive(Debug, Clone)]
+pub struct Norms {
+    nodes: Vec<Node>,
+    gravity: f64,
+    /// armature and viscous friction of every coordinate
+    terms: Vec<[f64; 2]>,
+}
+
+impl Norms {
+    /// Takes the norms.
+    pub fn new(robot: &Robot) -> Self {
+        let nodes = robot
+            .bodies
+            .iter()
+            .map(|body| {
+                let moments = SymmetricEigen::new(body.inertia.tensor()).eigenvalues;
+                Node {
+                    parent: body.parent,
+                    revolute: body.motion == Motion::Revolute,
+                    coordinate: body.coordinate,
+                    ratio: body.ratio.abs(),
+                    offset: body.offset.abs(),
+                    length: body.position.norm(),
+                    mass: body.inertia.mass().abs(),
+                    moment: body.inertia.first_moment().norm(),
+                    inertia: [moments.amax(), 0.5 * (moments.max() - moments.min())],
+                }
+            })
+            .collect();
+        let terms = robot
+            .joints
+            .iter()
+            .map(|j| [JointTerm::Armature, JointTerm::Viscous].map(|t| j.terms[t as usize].abs()))
+            .collect();
+        Norms {
+            nodes,
+            gravity: robot.gravity.norm(),
+            terms,
+        }
+    }
+
+    /// Bound of `|τ̈|` of every coordinate (N m/s², N/s²), rigid bodies, armature and viscous
+    /// friction together, where `coordinates[j][k] ≥ |q_j⁽ᵏ⁾|`, `k = 0 … 4`, on the interval of
+    /// time in question. See the [module](self) for the derivation.
+    ///
+    /// # Panics
+    /// If there are fewer coordinates than the robot has.
+    pub fn torque_curvature(&self, coordinates: &[Jet]) -> Vec<f64> {
+        let joints: Vec<Jet> = self
+            .nodes
+            .iter()
+            .map(|n| {
+                let mut q = scale(n.ratio, &coordinates[n.coordinate]);
+                q[0] += n.offset;
+                q
+            })
+            .collect();
+        let mut out: Vec<f64> = self
+            .terms
+            .iter()
+            .zip(coordinates)
+            .map(|([armature, viscous], q)| armature * q[4] + viscous * q[3])
+            .collect();
+
+        let mut frames: Vec<(Jet, Jet)> = Vec::with_capacity(self.nodes.len());
+        for (node, q) in self.nodes.iter().zip(&joints) {
+            let base = (ZERO, [self.gravity, 0.0, 0.0, 0.0, 0.0]);
+            let (omega, acceleration) = node.parent.map_or(base, |p| frames[p]);
+            let fixed = [node.length, 0.0, 0.0, 0.0, 0.0];
+            let frame = if node.revolute {
+                let turn = grow(1.0, 1.0, &rate(q));
+                let moved = sum(&acceleration, &inertial(&omega, &fixed));
+                (
+                    sum(&product(&turn, &omega), &rate(q)),
+                    product(&turn, &moved),
+                )
+            } else {
+                (
+                    omega,
+                    sum(&acceleration, &inertial(&omega, &sum(&fixed, q))),
+                )
+            };
+            frames.push(frame);
+        }
+        for (i, node) in self.nodes.iter().enumerate() {
+            out[node.coordinate] += node.ratio * self.subtree(i, &frames[i], &joints);
+        }
+        out.iter_mut().for_each(|v| *v *= 1.0 + 1e-9);
+        out
+    }
+
+    /// Bound of the second derivative of the force or moment of joint `i` along its axis.
+    fn subtree(&self, i: usize, (omega, acceleration): &(Jet, Jet), joints: &[Jet]) -> f64 {
+        // relative angular velocity, a unit vector of the body, origin
+        let mut seen: Vec<Option<(Jet, Jet, Jet)>> = vec![None; self.nodes.len()];
+        let (mut mass, mut first, mut momentum) = (0.0, ZERO, ZERO);
+        for b in i..self.nodes.len() {
+            let node = &self.nodes[b];
+            let state = if b == i {
+                (ZERO, [1.0, 0.0, 0.0, 0.0, 0.0], ZERO)
+            } else {
+                let Some((nu, unit, s)) = node.parent.and_then(|p| seen[p]) else {
+                    continue;
+                };
+                let s = sum(&s, &scale(node.length, &unit));
+                if node.revolute {
+                    let nu = sum(&nu, &product(&unit, &rate(&joints[b])));
+                    (nu, grow(1.0, 1.0, &nu), s)
+                } else {
+                    (nu, unit, sum(&s, &product(&unit, &joints[b])))
+                }
+            };
+            seen[b] = Some(state);
+            let (nu, unit, s) = state;
+            let velocity = sum(&rate(&s), &product(omega, &s));
+            let sigma = sum(omega, &nu);
+            let h = scale(node.moment, &unit);
+            let mut inertia = grow(node.inertia[1], 2.0, &nu);
+            inertia[0] = node.inertia[0];
+
+            mass += node.mass;
+            first = sum(&first, &sum(&scale(node.mass, &s), &h));
+            let of_mass = product(&sum(&scale(node.mass, &s), &h), &velocity);
+            let of_turn = sum(
+                &product(&s, &product(&sigma, &h)),
+                &product(&inertia, &sigma),
+            );
+            momentum = sum(&momentum, &sum(&of_mass, &of_turn));
+        }
+        if self.nodes[i].revolute {
+            let pulled = product(&first, acceleration);
+            rate(&momentum)[2] + product(omega, &momentum)[2] + pulled[2]
+        } else {
+            mass * acceleration[2] + inertial(omega, &first)[2]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn leibniz() {
+        // e^t has all derivatives 1 at 0; its square has 2^k
+        assert_eq!(product(&[1.0; 5], &[1.0; 5]), [1.0, 2.0, 4.0, 8.0, 16.0]);
+        // a unit vector that turns at a constant 3 rad/s
+        assert_eq!(
+            grow(1.0, 1.0, &[3.0, 0.0, 0.0, 0.0, 0.0]),
+            [1.0, 3.0, 9.0, 27.0, 81.0]
+        );
+        // a point at 2 m on a wheel at 3 rad/s: centripetal acceleration
+        let fixed = [2.0, 0.0, 0.0, 0.0, 0.0];
+        assert_eq!(inertial(&[3.0, 0.0, 0.0, 0.0, 0.0], &fixed)[0], 18.0);
+    }
+}
