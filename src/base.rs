@@ -93,7 +93,11 @@ pub fn random_states(robot: &Robot, count: usize, seed: u64) -> Samples {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut s = Samples::zeros(robot.dof(), count);
     for (j, joint) in robot.joints.iter().enumerate() {
-        let reach = if joint.motion == Motion::Revolute { std::f64::consts::PI } else { 0.5 };
+        let reach = if joint.motion == Motion::Revolute {
+            std::f64::consts::PI
+        } else {
+            0.5
+        };
         let [low, high] = joint.limits.position;
         let (low, high) = match (low.is_finite(), high.is_finite()) {
             (true, true) => (low, high),
@@ -127,8 +131,16 @@ impl BaseParameters {
         let states = random_states(robot, count, 0x0e_4c17e);
         let w = Regressor::with_tree(robot, &tree, &states);
         let mut base = Self::from_matrix(
-            robot.columns().iter().map(|c| robot.column_name(*c)).collect(),
-            robot.columns().iter().map(|c| robot.column_unit(*c)).collect(),
+            robot
+                .columns()
+                .iter()
+                .map(|c| robot.column_name(*c))
+                .collect(),
+            robot
+                .columns()
+                .iter()
+                .map(|c| robot.column_unit(*c))
+                .collect(),
             w.mat(),
         )?;
         for (k, column) in robot.columns().into_iter().enumerate() {
@@ -163,7 +175,9 @@ impl BaseParameters {
         // a column that is rounding noise beside the column of the same kind is zero
         let largest = norms.iter().cloned().fold(0.0, f64::max);
         let live: Vec<usize> = (0..p).filter(|&j| norms[j] > 1e-9 * largest).collect();
-        let scaled = Mat::from_fn(w.nrows(), live.len(), |i, j| w[(i, live[j])] / norms[live[j]]);
+        let scaled = Mat::from_fn(w.nrows(), live.len(), |i, j| {
+            w[(i, live[j])] / norms[live[j]]
+        });
         // R of a plain QR has the singular values of the whole and is small
         let r = scaled.qr().thin_R().to_owned();
         let sv = r
@@ -198,7 +212,11 @@ impl BaseParameters {
             match live.iter().position(|&j| j == dropped[d]) {
                 Some(j) => {
                     let x = k[(a, j)];
-                    if x.abs() < 1e-10 { 0.0 } else { x * norms[dropped[d]] / norms[kept_columns[a]] }
+                    if x.abs() < 1e-10 {
+                        0.0
+                    } else {
+                        x * norms[dropped[d]] / norms[kept_columns[a]]
+                    }
                 }
                 None => 0.0,
             }
@@ -302,12 +320,16 @@ impl BaseParameters {
                 } else {
                     format!("felt only together with {}", list(&partners, 4))
                 };
-                if let Column::Term { joint, term: JointTerm::Armature } = column
-                    && robot.bodies.iter().any(|b| b.coordinate == joint && b.parent.is_none())
+                if let Column::Term {
+                    joint,
+                    term: JointTerm::Armature,
+                } = column
+                    && robot
+                        .bodies
+                        .iter()
+                        .any(|b| b.coordinate == joint && b.parent.is_none())
                 {
-                    text = format!(
-                        "the rotor of a first joint turns exactly as its link: {text}"
-                    );
+                    text = format!("the rotor of a first joint turns exactly as its link: {text}");
                 }
                 text
             }
@@ -319,10 +341,18 @@ impl BaseParameters {
         let significant = |a: usize, d: usize| self.k[(a, d)].abs() > 1e-5;
         let mut all: Vec<usize> = Vec::new();
         if let Ok(a) = self.kept.binary_search(&index) {
-            all.extend((0..self.dropped.len()).filter(|&d| significant(a, d)).map(|d| self.dropped[d]));
+            all.extend(
+                (0..self.dropped.len())
+                    .filter(|&d| significant(a, d))
+                    .map(|d| self.dropped[d]),
+            );
         }
         if let Ok(d) = self.dropped.binary_search(&index) {
-            all.extend((0..self.count()).filter(|&a| significant(a, d)).map(|a| self.kept[a]));
+            all.extend(
+                (0..self.count())
+                    .filter(|&a| significant(a, d))
+                    .map(|a| self.kept[a]),
+            );
         }
         all.iter().map(|&j| self.names[j].as_str()).collect()
     }
@@ -352,7 +382,10 @@ fn none_reason(robot: &Robot, body: usize, k: usize) -> String {
     while let Some(p) = robot.bodies[chain[chain.len() - 1]].parent {
         chain.push(p);
     }
-    let turns = chain.iter().filter(|&&i| robot.bodies[i].motion == Motion::Revolute).count();
+    let turns = chain
+        .iter()
+        .filter(|&&i| robot.bodies[i].motion == Motion::Revolute)
+        .count();
     if turns == 0 {
         return match k {
             0 => "the link only slides at right angles to gravity and force".into(),
@@ -471,9 +504,10 @@ fn touches_null_space(
 ) -> bool {
     match kept.binary_search(&j) {
         Err(_) => true,
-        Ok(a) => dropped.iter().enumerate().any(|(d, &i)| {
-            norms[i] > 0.0 && (k[(a, d)] * norms[j] / norms[i]).abs() > 1e-5
-        }),
+        Ok(a) => dropped
+            .iter()
+            .enumerate()
+            .any(|(d, &i)| norms[i] > 0.0 && (k[(a, d)] * norms[j] / norms[i]).abs() > 1e-5),
     }
 }
 

@@ -45,7 +45,10 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 impl Error {
     /// An I/O error with the file it happened on.
     pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
-        Error::Io { path: path.as_ref().to_path_buf(), source }
+        Error::Io {
+            path: path.as_ref().to_path_buf(),
+            source,
+        }
     }
 
     /// An error in the contents of a file.
@@ -80,7 +83,10 @@ pub struct Warning {
 impl Warning {
     /// A warning about `subject`.
     pub fn new(subject: impl Into<String>, message: impl Into<String>) -> Self {
-        Warning { subject: subject.into(), message: message.into() }
+        Warning {
+            subject: subject.into(),
+            message: message.into(),
+        }
     }
 }
 

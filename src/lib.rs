@@ -2,9 +2,13 @@
 // (crate documentation is completed as the pieces land)
 #![warn(missing_docs)]
 
+pub mod base;
+pub mod design;
 pub mod dynamics;
 pub mod error;
+pub mod identifiability;
 pub mod output;
+pub mod regressor;
 pub mod robot;
 pub mod trajectory;
 

@@ -56,7 +56,12 @@ impl Regressor {
                 }
             }
         }
-        Regressor { columns, dof: motion.dof, count: motion.count, w }
+        Regressor {
+            columns,
+            dof: motion.dof,
+            count: motion.count,
+            w,
+        }
     }
 
     /// `W` as a matrix, `dof·count × columns`.
@@ -67,7 +72,9 @@ impl Regressor {
     /// `W` with the rows of each joint divided by its torque noise.
     pub fn weighted(&self, torque_noise: &[f64]) -> Mat<f64> {
         let w = self.mat();
-        Mat::from_fn(w.nrows(), w.ncols(), |i, j| w[(i, j)] / torque_noise[i / self.count])
+        Mat::from_fn(w.nrows(), w.ncols(), |i, j| {
+            w[(i, j)] / torque_noise[i / self.count]
+        })
     }
 }
 

@@ -30,8 +30,13 @@ fn regressor_times_parameters_is_inverse_dynamics() {
         tree.inverse_dynamics(ws, &phi, &motion, &mut tau);
         for row in 0..rows {
             let sum: f64 = (0..10 * n).map(|c| w[c * rows + row] * phi[c]).sum();
-            let size: f64 = (0..10 * n).map(|c| (w[c * rows + row] * phi[c]).abs()).sum();
-            assert!((sum - tau[row]).abs() <= 4e-15 * (1.0 + size), "seed {seed} row {row}");
+            let size: f64 = (0..10 * n)
+                .map(|c| (w[c * rows + row] * phi[c]).abs())
+                .sum();
+            assert!(
+                (sum - tau[row]).abs() <= 4e-15 * (1.0 + size),
+                "seed {seed} row {row}"
+            );
         }
         for j in 0..robot.dof() {
             for b in 0..n {
@@ -40,7 +45,11 @@ fn regressor_times_parameters_is_inverse_dynamics() {
                     w[c..c + count].iter()
                 });
                 let any = block.clone().any(|x| *x != 0.0);
-                assert_eq!(any, tree.moves(j, b), "structure of block {j},{b}, seed {seed}");
+                assert_eq!(
+                    any,
+                    tree.moves(j, b),
+                    "structure of block {j},{b}, seed {seed}"
+                );
             }
         }
     }
@@ -63,8 +72,11 @@ fn energy(robot: &Robot, q: &[f64], qd: &[f64]) -> f64 {
         let s = r.transpose() * dr;
         let w = Vector3::new(s.m32, s.m13, s.m21);
         let v = r.transpose() * v;
-        let (m, mc, tensor) =
-            (body.inertia.mass(), body.inertia.first_moment(), body.inertia.tensor());
+        let (m, mc, tensor) = (
+            body.inertia.mass(),
+            body.inertia.first_moment(),
+            body.inertia.tensor(),
+        );
         total += 0.5 * m * v.norm_squared() + v.dot(&w.cross(&mc)) + 0.5 * w.dot(&(tensor * w));
         total -= robot.gravity.dot(&(p * m + r * mc));
     }
@@ -82,14 +94,19 @@ fn power_balance() {
         let h = 1e-4;
         let e = |s: f64| {
             let at = |x: &[f64], y: &[f64], z: &[f64]| -> Vec<f64> {
-                (0..x.len()).map(|j| x[j] + s * y[j] + 0.5 * s * s * z[j]).collect()
+                (0..x.len())
+                    .map(|j| x[j] + s * y[j] + 0.5 * s * s * z[j])
+                    .collect()
             };
             let q = at(&m.q, &m.qd, &m.qdd);
             let qd = at(&m.qd, &m.qdd, &vec![0.0; m.q.len()]);
             energy(&robot, &q, &qd)
         };
         let rate = (e(h) - e(-h)) / (2.0 * h);
-        assert!((rate - power).abs() < 1e-4 * (1.0 + power.abs()), "{seed}: {rate} {power}");
+        assert!(
+            (rate - power).abs() < 1e-4 * (1.0 + power.abs()),
+            "{seed}: {rate} {power}"
+        );
     }
 }
 
@@ -100,20 +117,26 @@ fn gradients_match_differences() {
         let (tree, n, vectors) = (Tree::new(&robot), robot.dof(), 2);
         let m = common::samples(seed + 7, n, 11);
         let mut r = common::rng(seed + 8);
-        let parameters: Vec<f64> =
-            (0..vectors * 10 * robot.bodies.len()).map(|_| r.random_range(-1.0..1.0)).collect();
+        let parameters: Vec<f64> = (0..vectors * 10 * robot.bodies.len())
+            .map(|_| r.random_range(-1.0..1.0))
+            .collect();
         let step = n * m.count;
-        let rates: Vec<f64> = (0..vectors * step).map(|_| r.random_range(-1.0..1.0)).collect();
+        let rates: Vec<f64> = (0..vectors * step)
+            .map(|_| r.random_range(-1.0..1.0))
+            .collect();
         let mut out = Derivatives::default();
         tree.gradients(&mut Workspace::default(), &parameters, &m, &rates, &mut out);
         for k in 0..vectors {
             let phi = &parameters[k * 10 * robot.bodies.len()..];
             for i in 0..m.count {
-                let column = |x: &[f64]| -> Vec<f64> { (0..n).map(|j| x[j * m.count + i]).collect() };
+                let column =
+                    |x: &[f64]| -> Vec<f64> { (0..n).map(|j| x[j * m.count + i]).collect() };
                 let state = [column(&m.q), column(&m.qd), column(&m.qdd)];
                 let f = |s: &[Vec<f64>; 3]| -> f64 {
                     let tau = torque(&tree, phi, &s[0], &s[1], &s[2]);
-                    (0..n).map(|j| rates[k * step + j * m.count + i] * tau[j]).sum()
+                    (0..n)
+                        .map(|j| rates[k * step + j * m.count + i] * tau[j])
+                        .sum()
                 };
                 let scale = 1.0 + f(&state).abs();
                 for j in 0..n {

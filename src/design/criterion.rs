@@ -168,7 +168,13 @@ impl Objective {
     }
 
     /// Gradient of [`Objective::smooth_value`] at a point that was just evaluated.
-    pub fn smooth_gradient(&self, info: &Information, e: &mut Evaluation, s: &Spectrum, p: f64) -> Vec<f64> {
+    pub fn smooth_gradient(
+        &self,
+        info: &Information,
+        e: &mut Evaluation,
+        s: &Spectrum,
+        p: f64,
+    ) -> Vec<f64> {
         let l = &s.values;
         let r = l.len();
         let (low, high) = (l[0], l[r - 1]);
@@ -184,7 +190,9 @@ impl Objective {
                 Criterion::A => -0.5 / (total * l[k] * l[k]),
             })
             .collect();
-        let list: Vec<usize> = (0..r).filter(|&k| (weights[k] * l[k]).abs() > 1e-5).collect();
+        let list: Vec<usize> = (0..r)
+            .filter(|&k| (weights[k] * l[k]).abs() > 1e-5)
+            .collect();
         let mut vectors: Vec<Vec<f64>> = list.iter().map(|&k| s.vector(&[k, k])).collect();
         let mut w: Vec<f64> = list.iter().map(|&k| weights[k]).collect();
         if s.normalised {
@@ -192,18 +200,26 @@ impl Objective {
                 let mut u = vec![0.0; r];
                 u[k] = s.scale[k];
                 vectors.push(u);
-                w.push(-list.iter().map(|&a| weights[a] * l[a] * s.vectors[(k, a)].powi(2)).sum::<f64>());
+                w.push(
+                    -list
+                        .iter()
+                        .map(|&a| weights[a] * l[a] * s.vectors[(k, a)].powi(2))
+                        .sum::<f64>(),
+                );
             }
         }
         let matrix = Mat::from_fn(r, vectors.len(), |i, k| vectors[k][i]);
         let g = info.quadratic_gradients(e, matrix.as_ref());
-        (0..info.len()).map(|x| (0..w.len()).map(|k| w[k] * g[(x, k)]).sum()).collect()
+        (0..info.len())
+            .map(|x| (0..w.len()).map(|k| w[k] * g[(x, k)]).sum())
+            .collect()
     }
 
     /// Value only: what a trial point costs.
     pub fn evaluate(&self, info: &Information, x: &[f64], e: &mut Evaluation) -> f64 {
         info.evaluate(x, e);
-        self.spectrum(&e.gram).map_or(f64::INFINITY, |s| self.value(&s))
+        self.spectrum(&e.gram)
+            .map_or(f64::INFINITY, |s| self.value(&s))
     }
 
     /// Model at a point that was just evaluated.
@@ -256,9 +272,9 @@ impl Objective {
         let entry = |both: usize, own: [usize; 2], [i, j]: [usize; 2]| -> Vec<f64> {
             let mut out: Vec<f64> = match i == j {
                 true => (0..n).map(|x| g[(x, both)]).collect(),
-                false => {
-                    (0..n).map(|x| 0.5 * (g[(x, both)] - g[(x, own[0])] - g[(x, own[1])])).collect()
-                }
+                false => (0..n)
+                    .map(|x| 0.5 * (g[(x, both)] - g[(x, own[0])] - g[(x, own[1])]))
+                    .collect(),
             };
             if s.normalised {
                 let sum = s.values[i] + s.values[j];
@@ -292,7 +308,12 @@ impl Objective {
             let d = entry(smooth + k, [smooth + k; 2], [k, k]);
             gradient.iter_mut().zip(d).for_each(|(g, d)| *g += w * d);
         }
-        Ok(Model { value, gradient, upper, lower })
+        Ok(Model {
+            value,
+            gradient,
+            upper,
+            lower,
+        })
     }
 }
 
@@ -306,7 +327,11 @@ impl Spectrum {
             .map(at)
             .take_while(|&k| {
                 let ratio = self.values[k] / extreme;
-                if largest { ratio * REACH >= 1.0 } else { ratio <= REACH }
+                if largest {
+                    ratio * REACH >= 1.0
+                } else {
+                    ratio <= REACH
+                }
             })
             .collect()
     }

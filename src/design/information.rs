@@ -101,7 +101,10 @@ impl Information {
         let active = (0..dof)
             .map(|j| {
                 let moved = || (0..tree.bodies()).filter(|&b| tree.moves(j, b));
-                (moved().min().unwrap_or(0), moved().max().map_or(0, |b| b + 1))
+                (
+                    moved().min().unwrap_or(0),
+                    moved().max().map_or(0, |b| b + 1),
+                )
             })
             .collect();
         let terms = robot
@@ -130,7 +133,13 @@ impl Information {
             sign_width: robot
                 .joints
                 .iter()
-                .map(|j| if j.limits.velocity.is_finite() { 0.01 * j.limits.velocity } else { 0.02 })
+                .map(|j| {
+                    if j.limits.velocity.is_finite() {
+                        0.01 * j.limits.velocity
+                    } else {
+                        0.02
+                    }
+                })
                 .collect(),
             tree,
         }
@@ -173,13 +182,17 @@ impl Information {
         }
         let x = MatRef::from_column_major_slice(x, self.free, self.dof);
         for (design, out) in
-            self.designs.iter().zip([&mut motion.q, &mut motion.qd, &mut motion.qdd])
+            self.designs
+                .iter()
+                .zip([&mut motion.q, &mut motion.qd, &mut motion.qdd])
         {
             let out = MatMut::from_column_major_slice_mut(out, self.count, self.dof);
             matmul(out, Accum::Replace, design, x, 1.0, Par::Seq);
         }
         for (j, rest) in self.rest.iter().enumerate() {
-            motion.q[j * self.count..(j + 1) * self.count].iter_mut().for_each(|q| *q += rest);
+            motion.q[j * self.count..(j + 1) * self.count]
+                .iter_mut()
+                .for_each(|q| *q += rest);
         }
     }
 
@@ -188,7 +201,8 @@ impl Information {
         self.sample(x, &mut e.motion);
         let (n, p, c) = (self.count, self.columns, self.dof);
         e.blocks.resize(n * p * c, 0.0);
-        self.tree.regressor_blocks(&mut e.ws, &e.motion, &mut e.blocks, p);
+        self.tree
+            .regressor_blocks(&mut e.ws, &e.motion, &mut e.blocks, p);
         for &(column, joint, term) in &self.terms {
             let at = (joint * p + column) * n;
             for i in 0..n {
@@ -201,7 +215,8 @@ impl Information {
             e.full.fill(0.0);
         }
         for j in 0..c {
-            let block = MatRef::from_column_major_slice(&e.blocks[j * p * n..(j + 1) * p * n], n, p);
+            let block =
+                MatRef::from_column_major_slice(&e.blocks[j * p * n..(j + 1) * p * n], n, p);
             let (from, to) = (10 * self.active[j].0, 10 * self.active[j].1);
             let bodies = block.subcols(from, to - from);
             let w = self.weights[j];
@@ -233,12 +248,20 @@ impl Information {
         let phi = &self.transform * vectors;
         e.rates.resize(k * step, 0.0);
         for j in 0..self.dof {
-            let block = MatRef::from_column_major_slice(&e.blocks[j * p * n..(j + 1) * p * n], n, p);
+            let block =
+                MatRef::from_column_major_slice(&e.blocks[j * p * n..(j + 1) * p * n], n, p);
             let (from, to) = (10 * self.active[j].0, 10 * self.active[j].1);
             let at = &mut e.rates[j * n..];
             let out = MatMut::from_column_major_slice_with_stride_mut(at, n, k, step);
             let (w, bodies) = (2.0 * self.weights[j], block.subcols(from, to - from));
-            matmul(out, Accum::Replace, bodies, phi.subrows(from, to - from), w, Par::Seq);
+            matmul(
+                out,
+                Accum::Replace,
+                bodies,
+                phi.subrows(from, to - from),
+                w,
+                Par::Seq,
+            );
             for &(column, ..) in self.terms.iter().filter(|t| t.1 == j) {
                 for v in 0..k {
                     let f = w * phi[(column, v)];
@@ -253,7 +276,8 @@ impl Information {
         for v in 0..k {
             e.phi.extend((0..inertial).map(|c| phi[(c, v)]));
         }
-        self.tree.gradients(&mut e.ws, &e.phi, &e.motion, &e.rates, &mut e.derivatives);
+        self.tree
+            .gradients(&mut e.ws, &e.phi, &e.motion, &e.rates, &mut e.derivatives);
         for &(column, joint, term) in &self.terms {
             for v in 0..k {
                 let f = phi[(column, v)];
@@ -281,7 +305,14 @@ impl Information {
         let mut out = Mat::zeros(self.free, self.dof * k);
         for (design, g) in self.designs.iter().zip([&d.q, &d.qd, &d.qdd]) {
             let g = MatRef::from_column_major_slice(g, self.count, self.dof * k);
-            matmul(out.as_mut(), Accum::Add, design.transpose(), g, 1.0, Par::Seq);
+            matmul(
+                out.as_mut(),
+                Accum::Add,
+                design.transpose(),
+                g,
+                1.0,
+                Par::Seq,
+            );
         }
         let m = self.free;
         Mat::from_fn(self.len(), k, |i, v| out[(i % m, v * self.dof + i / m)])

@@ -62,7 +62,9 @@ impl Limits {
         let grid = (0..4)
             .map(|order| {
                 let d = coarse.design(order) * &basis.map;
-                (0..coarse.len()).map(|i| d.row(i).iter().copied().collect()).collect()
+                (0..coarse.len())
+                    .map(|i| d.row(i).iter().copied().collect())
+                    .collect()
             })
             .collect();
         let bands = robot
@@ -78,16 +80,28 @@ impl Limits {
                         true => (middle - half * derate, middle + half * derate),
                         false => (low, high),
                     };
-                    bands.push(Band { order: 0, low, high });
+                    bands.push(Band {
+                        order: 0,
+                        low,
+                        high,
+                    });
                 }
                 for (order, limit) in [(1, l.velocity), (2, l.acceleration), (3, l.jerk)] {
                     if limit.is_finite() {
-                        bands.push(Band { order, low: -limit * derate, high: limit * derate });
+                        bands.push(Band {
+                            order,
+                            low: -limit * derate,
+                            high: limit * derate,
+                        });
                     }
                 }
                 for b in &mut bands {
                     let size = (b.high - b.low).abs();
-                    let size = if size.is_finite() { size } else { b.low.abs().min(b.high.abs()) };
+                    let size = if size.is_finite() {
+                        size
+                    } else {
+                        b.low.abs().min(b.high.abs())
+                    };
                     b.low += MARGIN * size;
                     b.high -= MARGIN * size;
                 }
@@ -127,7 +141,9 @@ impl Limits {
             c[1 + h + k] = f * dc;
         }
         let map = &self.basis.map;
-        (0..map.ncols()).map(|m| (0..c.len()).map(|i| c[i] * map[(i, m)]).sum()).collect()
+        (0..map.ncols())
+            .map(|m| (0..c.len()).map(|i| c[i] * map[(i, m)]).sum())
+            .collect()
     }
 
     /// Rows for a subproblem around `x` with steps `|δ_k| ≤ reach_j`: those that such a step could
@@ -139,22 +155,40 @@ impl Limits {
             let x_j = &x[j * m..(j + 1) * m];
             let series = self.series(j, x_j);
             for b in bands {
-                let rest = if b.order == 0 { self.basis.offset[j][0] } else { 0.0 };
+                let rest = if b.order == 0 {
+                    self.basis.offset[j][0]
+                } else {
+                    0.0
+                };
                 let mut add = |row: Vec<f64>| {
                     let value: f64 = rest + row.iter().zip(x_j).map(|(r, x)| r * x).sum::<f64>();
                     let change = reach[j] * row.iter().map(|r| r.abs()).sum::<f64>();
                     if b.low - value + change > 0.0 && b.low.is_finite() {
                         let row = row.iter().map(|r| -r).collect();
-                        rows.push(Row { joint: j, row, slack: (value - b.low).max(0.0) });
+                        rows.push(Row {
+                            joint: j,
+                            row,
+                            slack: (value - b.low).max(0.0),
+                        });
                     }
                     if value + change - b.high > 0.0 && b.high.is_finite() {
-                        rows.push(Row { joint: j, row, slack: (b.high - value).max(0.0) });
+                        rows.push(Row {
+                            joint: j,
+                            row,
+                            slack: (b.high - value).max(0.0),
+                        });
                     }
                 };
                 for row in &self.grid[b.order as usize] {
                     add(row.clone());
                 }
-                extrema_fast(&self.table, &series, b.order, &mut work.samples, &mut work.found);
+                extrema_fast(
+                    &self.table,
+                    &series,
+                    b.order,
+                    &mut work.samples,
+                    &mut work.found,
+                );
                 for e in &work.found {
                     add(self.row(b.order, e.time));
                 }
@@ -191,7 +225,13 @@ impl Limits {
         let mut worst: f64 = 0.0;
         for b in &self.bands[j] {
             let rest = if b.order == 0 { self.rest(j) } else { 0.0 };
-            extrema_fast(&self.table, &series, b.order, &mut work.samples, &mut work.found);
+            extrema_fast(
+                &self.table,
+                &series,
+                b.order,
+                &mut work.samples,
+                &mut work.found,
+            );
             for e in &work.found {
                 worst = worst.max((e.value - rest) / (b.high - rest).max(1e-300));
                 worst = worst.max((rest - e.value) / (rest - b.low).max(1e-300));
@@ -209,7 +249,9 @@ impl Limits {
             let gauge = self.gauge(j, x_j, work);
             if gauge > 1.0 {
                 let rest = self.rest_parameters(j);
-                x_j.iter_mut().zip(rest).for_each(|(x, r)| *x = r + (*x - r) / gauge);
+                x_j.iter_mut()
+                    .zip(rest)
+                    .for_each(|(x, r)| *x = r + (*x - r) / gauge);
             }
         }
     }

@@ -1,7 +1,10 @@
-//! Design of exciting trajectories.
+//! Design of exciting trajectories: the criterion, the limits, and the sequential convex programs
+//! that bring them together.
+
 pub mod criterion;
 pub mod information;
 pub mod limits;
-pub mod solve;
+pub mod record;
+pub mod settings;
 pub mod start;
 pub mod torque;

@@ -18,9 +18,17 @@ pub fn scales(robot: &Robot, period: f64) -> Vec<f64> {
         .iter()
         .map(|j| {
             let [low, high] = j.limits.position;
-            let free = if j.motion == Motion::Revolute { std::f64::consts::PI } else { 0.5 };
+            let free = if j.motion == Motion::Revolute {
+                std::f64::consts::PI
+            } else {
+                0.5
+            };
             let half = 0.5 * (high - low);
-            let half = if half.is_finite() { half.min(2.0 * free) } else { free };
+            let half = if half.is_finite() {
+                half.min(2.0 * free)
+            } else {
+                free
+            };
             half.min(j.limits.velocity / omega).max(1e-6)
         })
         .collect()
@@ -73,7 +81,11 @@ pub fn random(
         let (mut motion, mut ws, mut tau) = (Samples::default(), Default::default(), Vec::new());
         let mut f = 1.0;
         for attempt in 0..40 {
-            let trial: Vec<f64> = x.iter().zip(&centre).map(|(x, c)| c + f * (x - c)).collect();
+            let trial: Vec<f64> = x
+                .iter()
+                .zip(&centre)
+                .map(|(x, c)| c + f * (x - c))
+                .collect();
             info.sample(&trial, &mut motion);
             t.torques(info, &motion, &mut ws, &mut tau);
             if t.worst(&tau).0 <= 1.0 {

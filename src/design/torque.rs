@@ -78,8 +78,14 @@ impl TorqueLimits {
         let count = tau.len() / self.room.len();
         let mut worst = (0.0, 0);
         for (j, room) in self.room.iter().enumerate() {
-            let most = tau[j * count..(j + 1) * count].iter().fold(0.0, |m: f64, t| m.max(t.abs()));
-            let used = if *room > 0.0 { most / room } else { f64::INFINITY };
+            let most = tau[j * count..(j + 1) * count]
+                .iter()
+                .fold(0.0, |m: f64, t| m.max(t.abs()));
+            let used = if *room > 0.0 {
+                most / room
+            } else {
+                f64::INFINITY
+            };
             if used > worst.0 {
                 worst = (used, j);
             }
@@ -96,7 +102,9 @@ impl TorqueLimits {
         self.torques(info, &e.motion, &mut ws, &mut tau);
         let near: Vec<Vec<usize>> = (0..dof)
             .map(|j| {
-                (0..count).filter(|i| tau[j * count + i].abs() > from * self.room[j]).collect()
+                (0..count)
+                    .filter(|i| tau[j * count + i].abs() > from * self.room[j])
+                    .collect()
             })
             .collect();
         let mut rows = Vec::new();
@@ -107,7 +115,8 @@ impl TorqueLimits {
             }
             let mut rates = vec![0.0; step];
             rates[j * count..(j + 1) * count].fill(1.0);
-            info.tree().gradients(&mut ws, &self.phi, &e.motion, &rates, &mut d);
+            info.tree()
+                .gradients(&mut ws, &self.phi, &e.motion, &rates, &mut d);
             for i in 0..count {
                 d.qd[j * count + i] += self.terms[j][JointTerm::Viscous as usize];
                 d.qdd[j * count + i] += self.terms[j][JointTerm::Armature as usize];

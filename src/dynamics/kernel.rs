@@ -61,7 +61,11 @@ pub(crate) struct Scratch<L> {
 
 impl<L: Lanes> Default for Scratch<L> {
     fn default() -> Self {
-        Scratch { frames: Vec::new(), flows: Vec::new(), twists: Vec::new() }
+        Scratch {
+            frames: Vec::new(),
+            flows: Vec::new(),
+            twists: Vec::new(),
+        }
     }
 }
 
@@ -69,12 +73,27 @@ impl<L: Lanes> Scratch<L> {
     /// Makes room for a robot; does nothing the second time.
     pub fn fit(&mut self, tree: &Tree) {
         let z = zero();
-        let frame =
-            Frame { r: [z; 3], p: z, omega: z, alpha: z, acc: z, qd: L::splat(0.0) };
-        let flow = Flow { f: z, n: z, v: z, w: z, acc: z, alpha: z, omega: z };
+        let frame = Frame {
+            r: [z; 3],
+            p: z,
+            omega: z,
+            alpha: z,
+            acc: z,
+            qd: L::splat(0.0),
+        };
+        let flow = Flow {
+            f: z,
+            n: z,
+            v: z,
+            w: z,
+            acc: z,
+            alpha: z,
+            omega: z,
+        };
         self.frames.resize(tree.nodes.len(), frame);
         self.flows.resize(tree.nodes.len(), flow);
-        self.twists.resize(tree.twist_start[tree.nodes.len()], (z, z));
+        self.twists
+            .resize(tree.twist_start[tree.nodes.len()], (z, z));
     }
 }
 
@@ -99,9 +118,17 @@ unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
         // SAFETY: by the caller's promise
         let (q, qd, qdd) = unsafe {
             let k = node.coordinate * pack.stride;
-            (L::load(pack.q.add(k)), L::load(pack.qd.add(k)), L::load(pack.qdd.add(k)))
+            (
+                L::load(pack.q.add(k)),
+                L::load(pack.qd.add(k)),
+                L::load(pack.qdd.add(k)),
+            )
         };
-        let (q, qd, qdd) = (q * node.ratio + L::splat(node.offset), qd * node.ratio, qdd * node.ratio);
+        let (q, qd, qdd) = (
+            q * node.ratio + L::splat(node.offset),
+            qd * node.ratio,
+            qdd * node.ratio,
+        );
         let a = splat3::<L>(&node.axis);
         let mut p = splat3::<L>(&node.position);
         let r: M3<L> = match node.motion {
@@ -111,7 +138,11 @@ unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
             }
             Motion::Prismatic => {
                 p = add(p, scale(splat3(&node.slide), q));
-                [splat3(&node.r0[0]), splat3(&node.r0[1]), splat3(&node.r0[2])]
+                [
+                    splat3(&node.r0[0]),
+                    splat3(&node.r0[1]),
+                    splat3(&node.r0[2]),
+                ]
             }
         };
         let (omega, alpha, acc) = match node.parent {
@@ -119,7 +150,11 @@ unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
                 let b = &s.frames[parent];
                 let (omega, alpha) = (get(&b.omega), get(&b.alpha));
                 let lever = add(cross(alpha, p), cross(omega, cross(omega, p)));
-                (mul_t(&r, omega), mul_t(&r, alpha), mul_t(&r, add(get(&b.acc), lever)))
+                (
+                    mul_t(&r, omega),
+                    mul_t(&r, alpha),
+                    mul_t(&r, add(get(&b.acc), lever)),
+                )
             }
             None => (zero(), zero(), mul_t(&r, [-g[0], -g[1], -g[2]])),
         };
@@ -129,9 +164,11 @@ unsafe fn kinematics<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratch<L>) {
                 add(alpha, add(scale(cross(omega, a), qd), scale(a, qdd))),
                 acc,
             ),
-            Motion::Prismatic => {
-                (omega, alpha, add(acc, add(scale(a, qdd), scale(cross(omega, a), qd + qd))))
-            }
+            Motion::Prismatic => (
+                omega,
+                alpha,
+                add(acc, add(scale(a, qdd), scale(cross(omega, a), qd + qd))),
+            ),
         };
         let frame = &mut s.frames[index];
         for i in 0..3 {
@@ -228,7 +265,9 @@ pub(crate) unsafe fn regressor<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratc
             let node = &tree.nodes[i];
             // SAFETY: by the caller's promise
             unsafe {
-                let at = sink.base.add(10 * j * sink.column + node.coordinate * sink.row);
+                let at = sink
+                    .base
+                    .add(10 * j * sink.column + node.coordinate * sink.row);
                 if tree.shared {
                     for c in 0..10 {
                         accumulate(at.add(c * sink.column), y[c] * node.ratio);
@@ -264,7 +303,11 @@ struct Params {
 #[inline(always)]
 fn params(phi: &[f64], body: usize) -> Params {
     let p = &phi[10 * body..10 * body + 10];
-    Params { m: p[0], h: [p[1], p[2], p[3]], i: [p[4], p[5], p[6], p[7], p[8], p[9]] }
+    Params {
+        m: p[0],
+        h: [p[1], p[2], p[3]],
+        i: [p[4], p[5], p[6], p[7], p[8], p[9]],
+    }
 }
 
 /// Wrench of every body and, accumulated, of its subtree.
@@ -275,8 +318,14 @@ fn wrenches<L: Lanes>(tree: &Tree, phi: &[f64], s: &mut Scratch<L>) {
         let p = params(phi, j);
         let h = splat3::<L>(&p.h);
         let (o, al, a) = (get(&b.omega), get(&b.alpha), get(&b.acc));
-        let f = add(scale(a, L::splat(p.m)), add(cross(al, h), cross(o, cross(o, h))));
-        let n = add(cross(h, a), add(sym_mul(&p.i, al), cross(o, sym_mul(&p.i, o))));
+        let f = add(
+            scale(a, L::splat(p.m)),
+            add(cross(al, h), cross(o, cross(o, h))),
+        );
+        let n = add(
+            cross(h, a),
+            add(sym_mul(&p.i, al), cross(o, sym_mul(&p.i, o))),
+        );
         set(&mut flow.f, f);
         set(&mut flow.n, n);
     }

@@ -171,12 +171,28 @@ mod x86 {
         };
     }
     pack!(
-        Avx2, __m256d, 4, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_set1_pd,
-        _mm256_loadu_pd, _mm256_storeu_pd, "Four samples in an AVX2 register."
+        Avx2,
+        __m256d,
+        4,
+        _mm256_add_pd,
+        _mm256_sub_pd,
+        _mm256_mul_pd,
+        _mm256_set1_pd,
+        _mm256_loadu_pd,
+        _mm256_storeu_pd,
+        "Four samples in an AVX2 register."
     );
     pack!(
-        Avx512, __m512d, 8, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_set1_pd,
-        _mm512_loadu_pd, _mm512_storeu_pd, "Eight samples in an AVX-512 register."
+        Avx512,
+        __m512d,
+        8,
+        _mm512_add_pd,
+        _mm512_sub_pd,
+        _mm512_mul_pd,
+        _mm512_set1_pd,
+        _mm512_loadu_pd,
+        _mm512_storeu_pd,
+        "Eight samples in an AVX-512 register."
     );
 }
 #[cfg(target_arch = "x86_64")]
@@ -288,7 +304,11 @@ pub(crate) fn dot<L: Lanes>(a: V3<L>, b: V3<L>) -> L {
 }
 #[inline(always)]
 pub(crate) fn cross<L: Lanes>(a: V3<L>, b: V3<L>) -> V3<L> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 /// Constant vector in all lanes.
 #[inline(always)]
@@ -392,7 +412,10 @@ mod tests {
             for d in [-1e-9, 0.0, 1e-9] {
                 let x = k as f64 * std::f64::consts::FRAC_PI_4 + d;
                 let (s, c) = sin_cos(x);
-                assert!((s - x.sin()).abs() < 4.5e-16 && (c - x.cos()).abs() < 4.5e-16, "{x}");
+                assert!(
+                    (s - x.sin()).abs() < 4.5e-16 && (c - x.cos()).abs() < 4.5e-16,
+                    "{x}"
+                );
             }
         }
     }

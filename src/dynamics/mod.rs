@@ -47,7 +47,13 @@ impl Samples {
     /// A motion at rest in zero, to be filled.
     pub fn zeros(dof: usize, count: usize) -> Self {
         let z = vec![0.0; dof * count];
-        Samples { dof, count, q: z.clone(), qd: z.clone(), qdd: z }
+        Samples {
+            dof,
+            count,
+            q: z.clone(),
+            qd: z.clone(),
+            qdd: z,
+        }
     }
 
     /// From one row a sample.
@@ -55,10 +61,17 @@ impl Samples {
     /// # Panics
     /// If a row has not `dof` entries, or the three lists differ in length.
     pub fn from_rows<R: AsRef<[f64]>>(dof: usize, q: &[R], qd: &[R], qdd: &[R]) -> Self {
-        assert!(q.len() == qd.len() && q.len() == qdd.len(), "as many positions as derivatives");
+        assert!(
+            q.len() == qd.len() && q.len() == qdd.len(),
+            "as many positions as derivatives"
+        );
         let mut s = Samples::zeros(dof, q.len());
         for i in 0..q.len() {
-            for (to, from) in [(&mut s.q, &q[i]), (&mut s.qd, &qd[i]), (&mut s.qdd, &qdd[i])] {
+            for (to, from) in [
+                (&mut s.q, &q[i]),
+                (&mut s.qd, &qd[i]),
+                (&mut s.qdd, &qdd[i]),
+            ] {
                 assert_eq!(from.as_ref().len(), dof, "one entry for each coordinate");
                 for (j, x) in from.as_ref().iter().enumerate() {
                     to[j * q.len() + i] = *x;
@@ -75,7 +88,11 @@ impl Samples {
     }
 
     fn check(&self, tree: &Tree) {
-        assert_eq!(self.dof, tree.dof(), "motion and robot differ in their coordinates");
+        assert_eq!(
+            self.dof,
+            tree.dof(),
+            "motion and robot differ in their coordinates"
+        );
         let n = self.dof * self.count;
         assert!(self.q.len() == n && self.qd.len() == n && self.qdd.len() == n);
     }
@@ -121,7 +138,10 @@ impl Workspace {
     /// # Panics
     /// If this machine does not have it.
     pub fn with_isa(isa: Isa) -> Self {
-        assert!(Isa::available().contains(&isa), "{isa:?} is not available on this machine");
+        assert!(
+            Isa::available().contains(&isa),
+            "{isa:?} is not available on this machine"
+        );
         Workspace {
             isa,
             one: Scratch::default(),
@@ -158,7 +178,12 @@ unsafe fn sweep<L: Lanes, J: Job>(job: &J, from: usize, to: usize, s: &mut Scrat
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-unsafe fn sweep_avx2<J: Job>(job: &J, from: usize, to: usize, s: &mut Scratch<lanes::Avx2>) -> usize {
+unsafe fn sweep_avx2<J: Job>(
+    job: &J,
+    from: usize,
+    to: usize,
+    s: &mut Scratch<lanes::Avx2>,
+) -> usize {
     // SAFETY: the caller made sure of AVX2
     unsafe { sweep(job, from, to, s) }
 }
@@ -199,9 +224,11 @@ fn run<J: Job>(job: &J, from: usize, to: usize, ws: &mut Workspace) {
 /// so the result does not depend on their number.
 fn run_parallel<J: Job + Sync>(job: &J, count: usize) {
     const CHUNK: usize = 256;
-    (0..count.div_ceil(CHUNK)).into_par_iter().for_each_init(Workspace::default, |ws, c| {
-        run(job, c * CHUNK, ((c + 1) * CHUNK).min(count), ws);
-    });
+    (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .for_each_init(Workspace::default, |ws, c| {
+            run(job, c * CHUNK, ((c + 1) * CHUNK).min(count), ws);
+        });
 }
 
 struct RegressorJob<'a> {
@@ -220,7 +247,10 @@ impl Job for RegressorJob<'_> {
     unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
         // SAFETY: by the caller's promise
         unsafe {
-            let sink = Sink { base: self.sink.base.add(i), ..self.sink };
+            let sink = Sink {
+                base: self.sink.base.add(i),
+                ..self.sink
+            };
             kernel::regressor(self.tree, self.motion.pack(i), s, sink);
         }
     }
@@ -271,7 +301,14 @@ impl Job for GradientJob<'_> {
             };
             let (pack, rates) = (self.motion.pack(i), self.rates.add(i));
             kernel::gradients(
-                self.tree, self.parameters, self.each, pack, s, rates, out, self.step,
+                self.tree,
+                self.parameters,
+                self.each,
+                pack,
+                s,
+                rates,
+                out,
+                self.step,
             );
         }
     }
@@ -311,8 +348,21 @@ impl Tree {
         if self.shared {
             w[..dof * columns * count].fill(0.0);
         }
-        let sink = Sink { base: w.as_mut_ptr(), column: count, row: columns * count };
-        run(&RegressorJob { tree: self, motion, sink }, 0, count, ws);
+        let sink = Sink {
+            base: w.as_mut_ptr(),
+            column: count,
+            row: columns * count,
+        };
+        run(
+            &RegressorJob {
+                tree: self,
+                motion,
+                sink,
+            },
+            0,
+            count,
+            ws,
+        );
     }
 
     /// [`Tree::regressor`] on all threads of the pool.
@@ -333,14 +383,25 @@ impl Tree {
         let rows = self.dof() * motion.count;
         assert!(stride >= rows, "stride {stride} is less than {rows} rows");
         let columns = 10 * self.bodies();
-        assert!(w.len() >= stride * (columns - 1) + rows, "regressor needs {columns} columns");
+        assert!(
+            w.len() >= stride * (columns - 1) + rows,
+            "regressor needs {columns} columns"
+        );
         if self.shared {
             for c in 0..columns {
                 w[c * stride..c * stride + rows].fill(0.0);
             }
         }
-        let sink = Sink { base: w.as_mut_ptr(), column: stride, row: motion.count };
-        RegressorJob { tree: self, motion, sink }
+        let sink = Sink {
+            base: w.as_mut_ptr(),
+            column: stride,
+            row: motion.count,
+        };
+        RegressorJob {
+            tree: self,
+            motion,
+            sink,
+        }
     }
 
     /// Inverse dynamics of the rigid bodies: `τ = Y φ` by recursive Newton-Euler, coordinate `j`
@@ -359,7 +420,12 @@ impl Tree {
         motion.check(self);
         assert!(phi.len() >= 10 * self.bodies(), "ten parameters a body");
         assert!(tau.len() >= self.dof() * motion.count, "torques do not fit");
-        let job = TorqueJob { tree: self, phi, motion, tau: tau.as_mut_ptr() };
+        let job = TorqueJob {
+            tree: self,
+            phi,
+            motion,
+            tau: tau.as_mut_ptr(),
+        };
         run(&job, 0, motion.count, ws);
     }
 
@@ -397,7 +463,15 @@ impl Tree {
             row: motion.count,
         };
         let rates = rates.as_ptr();
-        let job = GradientJob { tree: self, parameters, each, motion, rates, out, step };
+        let job = GradientJob {
+            tree: self,
+            parameters,
+            each,
+            motion,
+            rates,
+            out,
+            step,
+        };
         run(&job, 0, motion.count, ws);
     }
 }

@@ -108,6 +108,8 @@ impl Tree {
 
     /// Whether coordinate `j` moves body `b` (otherwise that block of the regressor is zero).
     pub fn moves(&self, j: usize, b: usize) -> bool {
-        self.chains[b].iter().any(|&i| self.nodes[i].coordinate == j)
+        self.chains[b]
+            .iter()
+            .any(|&i| self.nodes[i].coordinate == j)
     }
 }

@@ -12,8 +12,9 @@ use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3};
 pub const PARAMETERS: usize = 10;
 
 /// Names of the ten, in order, as they appear after the link's name (`link3.mx`).
-pub const NAMES: [&str; PARAMETERS] =
-    ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+pub const NAMES: [&str; PARAMETERS] = [
+    "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
+];
 
 /// Units of the ten.
 pub const UNITS: [&str; PARAMETERS] = [
@@ -84,8 +85,7 @@ impl Inertia {
         let h_b = rotation * self.first_moment();
         let s = skew(position);
         let sh = skew(&h_b);
-        let tensor =
-            rotation * self.tensor() * rotation.transpose() - s * sh - sh * s - s * s * m;
+        let tensor = rotation * self.tensor() * rotation.transpose() - s * sh - sh * s - s * s * m;
         Self::from_origin(m, h_b + position * m, tensor)
     }
 
@@ -112,7 +112,10 @@ impl Inertia {
         if largest <= 0.0 {
             return (if largest < 0.0 { -1.0 } else { 0.0 }, 0.0);
         }
-        (smallest / largest, ((2.0 * largest - sum) / largest).max(0.0))
+        (
+            smallest / largest,
+            ((2.0 * largest - sum) / largest).max(0.0),
+        )
     }
 }
 

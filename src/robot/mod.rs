@@ -104,8 +104,12 @@ pub enum JointTerm {
 
 impl JointTerm {
     /// All four, in the order of their columns.
-    pub const ALL: [JointTerm; 4] =
-        [JointTerm::Armature, JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
+    pub const ALL: [JointTerm; 4] = [
+        JointTerm::Armature,
+        JointTerm::Viscous,
+        JointTerm::Coulomb,
+        JointTerm::Offset,
+    ];
 
     /// Name as in `robot.toml`.
     pub fn name(self) -> &'static str {
@@ -214,7 +218,12 @@ impl Robot {
     /// Number of columns of the regressor: `10 · bodies + identified joint terms`.
     pub fn parameter_count(&self) -> usize {
         10 * self.bodies.len()
-            + self.joints.iter().flat_map(|j| j.identify).filter(|&b| b).count()
+            + self
+                .joints
+                .iter()
+                .flat_map(|j| j.identify)
+                .filter(|&b| b)
+                .count()
     }
 
     /// The columns of the regressor in order: ten per body, then, joint by joint, the terms in

@@ -59,7 +59,11 @@ pub fn robot(seed: u64, n: usize, mimic: bool) -> Robot {
         let parent = match i {
             0 => None,
             _ if r.random_bool(0.15) => None,
-            _ => Some(if r.random_bool(0.7) { i - 1 } else { r.random_range(0..i) }),
+            _ => Some(if r.random_bool(0.7) {
+                i - 1
+            } else {
+                r.random_range(0..i)
+            }),
         };
         let follow = mimic && i == n - 1 && n > 1;
         let motion = match (follow, r.random_bool(0.75)) {
@@ -114,15 +118,21 @@ pub fn samples(seed: u64, dof: usize, count: usize) -> Samples {
 pub fn poses(robot: &Robot, q: &[f64]) -> Vec<(Matrix3<f64>, Vector3<f64>)> {
     let mut all: Vec<(Matrix3<f64>, Vector3<f64>)> = Vec::new();
     for b in &robot.bodies {
-        let (rp, pp) = b.parent.map_or((Matrix3::identity(), Vector3::zeros()), |p| all[p]);
+        let (rp, pp) = b
+            .parent
+            .map_or((Matrix3::identity(), Vector3::zeros()), |p| all[p]);
         let x = b.ratio * q[b.coordinate] + b.offset;
         let (turn, slide) = match b.motion {
-            Motion::Revolute => {
-                (*Rotation3::from_scaled_axis(b.axis * x).matrix(), Vector3::zeros())
-            }
+            Motion::Revolute => (
+                *Rotation3::from_scaled_axis(b.axis * x).matrix(),
+                Vector3::zeros(),
+            ),
             Motion::Prismatic => (Matrix3::identity(), b.axis * x),
         };
-        all.push((rp * b.rotation * turn, pp + rp * (b.position + b.rotation * slide)));
+        all.push((
+            rp * b.rotation * turn,
+            pp + rp * (b.position + b.rotation * slide),
+        ));
     }
     all
 }

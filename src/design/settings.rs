@@ -1,0 +1,137 @@
+//! Settings of a design: one struct for library, command line and report.
+
+use super::criterion::{Condition, Criterion};
+use crate::error::{Error, Result};
+use crate::robot::Robot;
+use crate::trajectory::{Ends, Grid};
+
+/// Settings of a design. Every field has a default that suits most arms.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// harmonics of the Fourier series of each joint
+    pub harmonics: usize,
+    /// period, s
+    pub period: f64,
+    /// periods of the experiment
+    pub periods: u32,
+    /// which harmonics: all, odd only, or odd with random ones left out
+    pub grid: Grid,
+    /// `rest`: zero velocity and acceleration at both ends; `free`
+    pub ends: Ends,
+    /// posture at the start, rad or m per joint, where it is prescribed
+    pub start: Option<Vec<f64>>,
+    /// what is minimised
+    pub criterion: Criterion,
+    /// of which matrix
+    pub condition: Condition,
+    /// fraction of every limit that may be used
+    pub derate: f64,
+    /// seed of the random starts
+    pub seed: u64,
+    /// most starts that are followed
+    pub starts: usize,
+    /// wall clock of the optimisation, s
+    pub time_limit: f64,
+    /// threads; 0 for one per core
+    pub threads: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            harmonics: 5,
+            period: 10.0,
+            periods: 1,
+            grid: Grid::Full,
+            ends: Ends::Rest,
+            start: None,
+            criterion: Criterion::Condition,
+            condition: Condition::Invariant,
+            derate: 1.0,
+            seed: 1,
+            starts: 16,
+            time_limit: 10.0,
+            threads: 0,
+        }
+    }
+}
+
+impl Settings {
+    /// Checks the settings against each other and against the robot.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] that names the setting and says what it must be.
+    pub fn check(&self, robot: &Robot) -> Result<()> {
+        let bad = |what: String| Err(Error::Argument(what));
+        let least = if self.ends == Ends::Rest { 2 } else { 1 };
+        if self.harmonics < least || self.harmonics > 200 {
+            return bad(format!(
+                "harmonics must be between {least} and 200, not {}: with ends at rest two of the \
+                 coefficients of each joint are spent on them",
+                self.harmonics
+            ));
+        }
+        if !(self.period.is_finite() && self.period > 0.0 && self.period <= 1e5) {
+            return bad(format!(
+                "period must be more than 0 and at most 1e5 s, not {}",
+                self.period
+            ));
+        }
+        if self.periods == 0 || self.periods > 10_000 {
+            return bad(format!(
+                "periods must be between 1 and 10000, not {}",
+                self.periods
+            ));
+        }
+        if !(self.derate > 0.0 && self.derate <= 1.0) {
+            return bad(format!(
+                "derate must be more than 0 and at most 1, not {}",
+                self.derate
+            ));
+        }
+        if self.starts == 0 || self.starts > 1_000_000 {
+            return bad(format!(
+                "starts must be between 1 and 1000000, not {}",
+                self.starts
+            ));
+        }
+        if self.time_limit.is_nan() || self.time_limit <= 0.0 {
+            return bad(format!(
+                "time limit must be more than 0 s, not {}",
+                self.time_limit
+            ));
+        }
+        if self.threads > 1024 {
+            return bad(format!(
+                "threads must be at most 1024, not {}",
+                self.threads
+            ));
+        }
+        if let Some(start) = &self.start {
+            if start.len() != robot.dof() {
+                return bad(format!(
+                    "the start posture has {} numbers, {} has {} joints",
+                    start.len(),
+                    robot.name,
+                    robot.dof()
+                ));
+            }
+            for (q, joint) in start.iter().zip(&robot.joints) {
+                let [low, high] = joint.limits.position;
+                let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * self.derate);
+                let (low, high) = match half.is_finite() {
+                    true => (middle - half, middle + half),
+                    false => (low, high),
+                };
+                if !q.is_finite() || *q <= low || *q >= high {
+                    return bad(format!(
+                        "the start posture puts {} at {q}, outside its range {low:.4} to {high:.4}",
+                        joint.name
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
