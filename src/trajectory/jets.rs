@@ -267,12 +267,78 @@ mod tests {
         // e^t has all derivatives 1 at 0; its square has 2^k
         assert_eq!(product(&[1.0; 5], &[1.0; 5]), [1.0, 2.0, 4.0, 8.0, 16.0]);
         // a unit vector that turns at a constant 3 rad/s
-        assert_eq!(
-            grow(1.0, 1.0, &[3.0, 0.0, 0.0, 0.0, 0.0]),
-            [1.0, 3.0, 9.0, 27.0, 81.0]
-        );
+        let turning = grow(1.0, 1.0, &[3.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(turning, [1.0, 3.0, 9.0, 27.0, 81.0]);
         // a point at 2 m on a wheel at 3 rad/s: centripetal acceleration
         let fixed = [2.0, 0.0, 0.0, 0.0, 0.0];
         assert_eq!(inertial(&[3.0, 0.0, 0.0, 0.0, 0.0], &fixed)[0], 18.0);
+    }
+
+    /// A turntable (joint 0), a joint on it, a rotor on that, turning at constant rates, made of
+    /// nothing until `change` says so. Bound for the joint in the middle.
+    fn turntable(rates: [f64; 3], change: impl Fn(&mut [Node])) -> f64 {
+        let node = |i: usize| Node {
+            parent: i.checked_sub(1),
+            revolute: true,
+            coordinate: i,
+            ratio: 1.0,
+            offset: 0.0,
+            length: 0.0,
+            mass: 0.0,
+            moment: 0.0,
+            inertia: [0.0; 2],
+        };
+        let mut nodes: Vec<Node> = (0..3).map(node).collect();
+        change(&mut nodes);
+        let norms = Norms {
+            nodes,
+            gravity: 0.0,
+            terms: vec![[0.0; 2]; 3],
+        };
+        norms.torque_curvature(&rates.map(|rate| [0.0, rate, 0.0, 0.0, 0.0]))[1]
+    }
+
+    #[test]
+    fn centrifugal_and_coriolis_force_of_an_unbalanced_rotor() {
+        // force along a slide: m r (Ω + ω)² cos ωt; the bound is the amplitude of its second
+        // derivative exactly, so no term is missing and none is too large
+        for (turn, spin) in [(2.0, 3.0), (5.0, 0.5), (0.0, 4.0)] {
+            let exact = 0.7 * (turn + spin) * (turn + spin) * spin * spin;
+            let bound = turntable([turn, 0.0, spin], |nodes| {
+                nodes[1].revolute = false;
+                nodes[2].moment = 0.7;
+            });
+            assert!((bound / exact - 1.0).abs() < 1e-8, "{bound} {exact}");
+        }
+    }
+
+    #[test]
+    fn gyroscopic_moment_of_a_skew_rotor() {
+        // moment about a horizontal hinge: I_xz (Ω + ω)² cos ωt, I_xz at most half the spread of
+        // the principal moments; on a fast turntable Ω × H is nearly all of it
+        let (turn, spin): (f64, f64) = (100.0, 0.1);
+        let exact = 0.3 * (turn + spin).powi(2) * spin.powi(2);
+        let bound = turntable([turn, 0.0, spin], |nodes| nodes[2].inertia = [2.0, 0.3]);
+        assert!(bound >= exact && bound < 4.1 * exact, "{bound} {exact}");
+    }
+
+    #[test]
+    fn moment_of_a_body_that_tumbles_on_a_turntable() {
+        // about the hinge: (I_zz − I_yy) Ω² sin ωt cos ωt
+        let (turn, spin): (f64, f64) = (3.0, 1.0);
+        let exact = 2.0 * 0.6 * (turn * spin).powi(2);
+        let bound = turntable([turn, spin, 0.0], |nodes| nodes[1].inertia = [2.0, 0.3]);
+        assert!(bound >= exact && bound < 20.0 * exact, "{bound} {exact}");
+    }
+
+    #[test]
+    fn moment_of_an_unbalanced_rotor_at_a_distance() {
+        // about a hinge held still, at a distance l: l m r ω² cos ωt, bounded exactly
+        let exact = 0.5 * 0.7 * 3f64.powi(4);
+        let bound = turntable([0.0, 0.0, 3.0], |nodes| {
+            nodes[2].length = 0.5;
+            nodes[2].moment = 0.7;
+        });
+        assert!((bound / exact - 1.0).abs() < 1e-8, "{bound} {exact}");
     }
 }

@@ -9,6 +9,7 @@
 pub mod basis;
 pub mod certificate;
 pub mod extrema;
+mod extrema_fast;
 pub mod file;
 pub mod fourier;
 pub mod grid;
@@ -20,7 +21,8 @@ pub mod transition;
 
 pub use basis::{Basis, Ends};
 pub use certificate::{Certificate, certify};
-pub use extrema::{Extrema, Extremum, extrema, extrema_fast};
+pub use extrema::{Extrema, Extremum, extrema};
+pub use extrema_fast::extrema_fast;
 pub use file::Trajectory;
 pub use fourier::{Fourier, Series};
 pub use grid::Grid;

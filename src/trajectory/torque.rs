@@ -72,7 +72,8 @@ struct Interval {
 /// `|τ| ≤ max(|τ_i|, |τ_{i+1}|) + (h²/8) sup |τ̈|`. Intervals where this could exceed the largest
 /// sample of some joint by more than 0.2 % of its effort limit (of the largest torque of the
 /// robot, where there is no limit) are halved, the most excessive first, until none is left or
-/// `samples` evaluations are spent. Either way the bound reported holds.
+/// `samples` evaluations are spent. Either way the bound reported holds, up
+/// to the rounding of `torque` itself.
 ///
 /// # Errors
 /// [`Error::Argument`] if the trajectory is malformed or has another number of joints than the
