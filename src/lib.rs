@@ -2,6 +2,7 @@
 // (crate documentation is completed as the pieces land)
 #![warn(missing_docs)]
 
+pub mod conic;
 pub mod error;
 pub mod robot;
 
