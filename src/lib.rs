@@ -3,6 +3,7 @@
 #![warn(missing_docs)]
 
 pub mod base;
+pub mod conic;
 pub mod design;
 pub mod dynamics;
 pub mod error;
