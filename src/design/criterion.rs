@@ -223,13 +223,9 @@ impl Objective {
     }
 
     /// Model at a point that was just evaluated.
-    ///
-    /// # Errors
-    /// As [`Objective::spectrum`].
-    pub fn model(&self, info: &Information, e: &mut Evaluation) -> Result<Model> {
-        let s = self.spectrum(&e.gram)?;
+    pub fn model(&self, info: &Information, e: &mut Evaluation, s: &Spectrum) -> Model {
         let r = s.values.len();
-        let value = self.value(&s);
+        let value = self.value(s);
         let wants = |c: &[Criterion]| c.contains(&self.criterion);
         let lower = wants(&[Criterion::Condition, Criterion::E]).then(|| s.near(false, LOWER));
         let upper = wants(&[Criterion::Condition]).then(|| s.near(true, UPPER));
@@ -308,12 +304,12 @@ impl Objective {
             let d = entry(smooth + k, [smooth + k; 2], [k, k]);
             gradient.iter_mut().zip(d).for_each(|(g, d)| *g += w * d);
         }
-        Ok(Model {
+        Model {
             value,
             gradient,
             upper,
             lower,
-        })
+        }
     }
 }
 

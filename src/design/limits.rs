@@ -58,7 +58,7 @@ impl Limits {
     pub fn new(robot: &Robot, basis: &Basis, period: f64, derate: f64) -> Self {
         let most = basis.harmonics.iter().copied().max().unwrap_or(1) as usize;
         let table = Table::new(period, &basis.harmonics, 24 * most);
-        let coarse = Table::new(period, &basis.harmonics, 8 * most);
+        let coarse = Table::new(period, &basis.harmonics, 4 * most);
         let grid = (0..4)
             .map(|order| {
                 let d = coarse.design(order) * &basis.map;
@@ -146,55 +146,60 @@ impl Limits {
             .collect()
     }
 
-    /// Rows for a subproblem around `x` with steps `|δ_k| ≤ reach_j`: those that such a step could
-    /// make active.
-    pub fn rows(&self, x: &[f64], reach: &[f64], work: &mut ExtremaWork) -> Vec<Row> {
+    /// Rows for a subproblem around `x`: at the exact extrema and at the grid, those instants that
+    /// use more than `near` of a limit (measured from the rest posture).
+    pub fn rows(&self, x: &[f64], near: f64, work: &mut ExtremaWork) -> Vec<Row> {
         let m = self.basis.free();
         let mut rows = Vec::new();
         for (j, bands) in self.bands.iter().enumerate() {
             let x_j = &x[j * m..(j + 1) * m];
             let series = self.series(j, x_j);
             for b in bands {
-                let rest = if b.order == 0 {
-                    self.basis.offset[j][0]
-                } else {
-                    0.0
-                };
-                let mut add = |row: Vec<f64>| {
-                    let value: f64 = rest + row.iter().zip(x_j).map(|(r, x)| r * x).sum::<f64>();
-                    let change = reach[j] * row.iter().map(|r| r.abs()).sum::<f64>();
-                    if b.low - value + change > 0.0 && b.low.is_finite() {
-                        let row = row.iter().map(|r| -r).collect();
-                        rows.push(Row {
-                            joint: j,
-                            row,
-                            slack: (value - b.low).max(0.0),
-                        });
-                    }
-                    if value + change - b.high > 0.0 && b.high.is_finite() {
-                        rows.push(Row {
-                            joint: j,
-                            row,
-                            slack: (b.high - value).max(0.0),
-                        });
-                    }
-                };
                 for row in &self.grid[b.order as usize] {
-                    add(row.clone());
+                    self.push(j, b, row, x_j, near, &mut rows);
                 }
-                extrema_fast(
-                    &self.table,
-                    &series,
-                    b.order,
-                    &mut work.samples,
-                    &mut work.found,
-                );
+                extrema_fast(&self.table, &series, b.order, &mut work.samples, &mut work.found);
                 for e in &work.found {
-                    add(self.row(b.order, e.time));
+                    self.push(j, b, &self.row(b.order, e.time), x_j, near, &mut rows);
                 }
             }
         }
         rows
+    }
+
+    /// Adds the row of one instant where it is near a limit.
+    fn push(&self, j: usize, b: &Band, row: &[f64], x_j: &[f64], near: f64, rows: &mut Vec<Row>) {
+        let constant = if b.order == 0 { self.basis.offset[j][0] } else { 0.0 };
+        let value = constant + row.iter().zip(x_j).map(|(r, x)| r * x).sum::<f64>();
+        let rest = if b.order == 0 { self.rest(j) } else { 0.0 };
+        if value - rest > near * (b.high - rest) {
+            rows.push(Row { joint: j, row: row.to_vec(), slack: (b.high - value).max(0.0) });
+        }
+        if rest - value > near * (rest - b.low) {
+            let row = row.iter().map(|r| -r).collect();
+            rows.push(Row { joint: j, row, slack: (value - b.low).max(0.0) });
+        }
+    }
+
+    /// Adds the instants at which `next` leaves a limit by more than a thousandth of it, as rows
+    /// around `x`.
+    pub fn cut(&self, x: &[f64], next: &[f64], rows: &mut Vec<Row>, work: &mut ExtremaWork) {
+        let m = self.basis.free();
+        for (j, bands) in self.bands.iter().enumerate() {
+            let x_j = &x[j * m..(j + 1) * m];
+            let series = self.series(j, &next[j * m..(j + 1) * m]);
+            for b in bands {
+                let rest = if b.order == 0 { self.rest(j) } else { 0.0 };
+                extrema_fast(&self.table, &series, b.order, &mut work.samples, &mut work.found);
+                for e in &work.found {
+                    let over = (e.value - rest) / (b.high - rest);
+                    let under = (rest - e.value) / (rest - b.low);
+                    if over > 1.001 || under > 1.001 {
+                        self.push(j, b, &self.row(b.order, e.time), x_j, f64::NEG_INFINITY, rows);
+                    }
+                }
+            }
+        }
     }
 
     /// Posture that joint `j` rests in when its motion is shrunk to nothing: the start posture

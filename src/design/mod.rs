@@ -1,10 +1,343 @@
 //! Design of exciting trajectories: the criterion, the limits, and the sequential convex programs
 //! that bring them together.
+//!
+//! ```text
+//! minimise over x   cond W(x)      (or another criterion)
+//! subject to        q_min ≤ q(t; x) ≤ q_max,  |q̇| ≤ v,  |q̈| ≤ a,  |q⃛| ≤ j,  |τ| ≤ τ_max   for all t
+//! ```
+//!
+//! with `q(t; x)` a Fourier series whose end conditions are built in ([`Basis`]). The problem is
+//! not convex, so [`design`] runs many starts in rounds: eight random ones are each improved by
+//! convex programs ([`solve`]), the best three of them are followed to the end, and later rounds
+//! also start from disturbed copies of the best so far. Each start has its own stream of random
+//! numbers and rounds are compared in a fixed order, so the result is the same for the same seed
+//! whatever the number of threads, unless a time limit ends the run.
 
 pub mod criterion;
 pub mod information;
 pub mod limits;
 pub mod record;
 pub mod settings;
+pub mod solve;
 pub mod start;
 pub mod torque;
+
+pub use criterion::{Condition, Criterion};
+pub use record::{Record, Status};
+pub use settings::Settings;
+
+use crate::base::BaseParameters;
+use crate::dynamics::Tree;
+use crate::error::{Error, Result, Warning};
+use crate::identifiability::{certificate, torque_noise};
+use crate::robot::{JointTerm, Motion, Robot};
+use crate::trajectory::{Basis, Trajectory};
+use criterion::Objective;
+use information::Information;
+use limits::Limits;
+use rayon::prelude::*;
+use solve::{Iterate, Phase, Stop, Task};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use torque::TorqueLimits;
+
+/// Starts in a round, and how many of them are followed to the end.
+const ROUND: (usize, usize) = (8, 3);
+/// Random candidates of which the best becomes a start.
+const CANDIDATES: usize = 24;
+/// Exponents of the p-norms that smooth the extreme eigenvalues, first and second phase.
+const NORMS: (f64, f64) = (10.0, 40.0);
+
+/// A designed trajectory and how it came about.
+#[derive(Debug, Clone)]
+pub struct Design {
+    /// the robot, with the limits that were assumed where it states none
+    pub robot: Robot,
+    /// the trajectory, inside all limits for all time
+    pub trajectory: Trajectory,
+    /// criterion of the result (see [`record::Start::history`] for what it is)
+    pub value: f64,
+    /// what happened
+    pub record: Record,
+}
+
+/// Where a design stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// starts done
+    pub starts: usize,
+    /// starts planned; `None` while only time ends the run
+    pub planned: Option<usize>,
+    /// best criterion so far
+    pub best: f64,
+    /// wall clock, s
+    pub seconds: f64,
+}
+
+/// Fills in limits that a robot does not state, each with a warning: ±π or ±0.5 m, 1 rad/s or
+/// 0.25 m/s, five times the velocity per second. Jerk and effort stay unlimited.
+pub fn with_assumed_limits(robot: &Robot) -> Robot {
+    let mut robot = robot.clone();
+    for joint in &mut robot.joints {
+        let l = &mut joint.limits;
+        let mut assumed = Vec::new();
+        let (reach, speed, unit) = match joint.motion {
+            Motion::Revolute => (std::f64::consts::PI, 1.0, "rad"),
+            Motion::Prismatic => (0.5, 0.25, "m"),
+        };
+        let [low, high] = l.position;
+        if !low.is_finite() || !high.is_finite() {
+            l.position = match (low.is_finite(), high.is_finite()) {
+                (true, _) => [low, low + 2.0 * reach],
+                (_, true) => [high - 2.0 * reach, high],
+                _ => [-reach, reach],
+            };
+            assumed.push(format!("position {:.4} to {:.4} {unit}", l.position[0], l.position[1]));
+        }
+        if !l.velocity.is_finite() {
+            l.velocity = speed;
+            assumed.push(format!("velocity {speed} {unit}/s"));
+        }
+        if !l.acceleration.is_finite() {
+            l.acceleration = 5.0 * l.velocity;
+            assumed.push(format!("acceleration {} {unit}/s^2", l.acceleration));
+        }
+        if !assumed.is_empty() {
+            robot.warnings.push(Warning::new(
+                joint.name.clone(),
+                format!("limits not stated, assumed for the design: {}", assumed.join(", ")),
+            ));
+        }
+        if !joint.limits.effort.is_finite() {
+            robot.warnings.push(Warning::new(
+                joint.name.clone(),
+                "no effort limit stated: its torque is not limited in the design",
+            ));
+        }
+    }
+    robot
+}
+
+/// Designs an exciting trajectory.
+///
+/// `interrupt` ends the run early when set; `progress` is called after every finished start. In
+/// both cases, and when a time limit ends the run, the best feasible trajectory so far is
+/// returned.
+///
+/// # Errors
+/// [`Error::Argument`] for settings that cannot be, [`Error::Infeasible`] where no trajectory is
+/// inside the limits (torques at rest, say) or nothing can be identified.
+pub fn design(
+    robot: &Robot,
+    settings: &Settings,
+    interrupt: &AtomicBool,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design> {
+    settings.check(robot)?;
+    let begin = Instant::now();
+    let (starts, time_limit) = settings.budget();
+    let deadline = begin + Duration::from_secs_f64(time_limit.min(1e8));
+    let robot = with_assumed_limits(robot);
+    let base = BaseParameters::new(&robot)?;
+    if base.count() == 0 {
+        return Err(Error::Infeasible(format!(
+            "{}: no parameter can be identified from joint torques, so there is nothing to excite; \
+             check gravity, axes and `identify`",
+            robot.name
+        )));
+    }
+    let harmonics = settings.grid.harmonics(settings.harmonics, settings.seed);
+    let basis = Basis::new(&harmonics, settings.ends, robot.dof(), settings.start.as_deref())?;
+    let count = samples(&robot, &harmonics);
+    let transform = match settings.condition {
+        Condition::Invariant => base.row_space.clone(),
+        _ => base.selection(),
+    };
+    let noise = torque_noise(&robot).0;
+    let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
+    let info = Information::new(&robot, &basis, settings.period, count, transform, weights);
+    let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
+    let torque = TorqueLimits::new(&robot, settings.derate);
+    let scale = start::scales(&robot, settings.period);
+    let objective = Objective { criterion: settings.criterion, condition: settings.condition };
+    let task = Task {
+        info: &info,
+        objective,
+        limits: &limits,
+        torque: torque.as_ref(),
+        scale: &scale,
+        deadline: time_limit.is_finite().then_some(deadline),
+    };
+
+    let halt = || interrupt.load(Ordering::Relaxed) || Instant::now() >= deadline;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads)
+        .build()
+        .map_err(|e| Error::Argument(format!("threads: {e}")))?;
+    let source = start::Source { robot: &robot, basis: &basis, task: &task, seed: settings.seed };
+    let mut search = Search::default();
+    pool.install(|| -> Result<()> {
+        while search.next < starts && (search.best.is_none() || !halt()) {
+            search.round(&source, starts, &halt, &|done, best| {
+                progress(Progress {
+                    starts: done,
+                    planned: (starts < usize::MAX).then_some(starts),
+                    best: best.exp(),
+                    seconds: begin.elapsed().as_secs_f64(),
+                });
+            })?;
+        }
+        Ok(())
+    })?;
+    let status = match (interrupt.load(Ordering::Relaxed), halt()) {
+        (true, _) => Status::Interrupted,
+        (_, true) => Status::TimeLimit,
+        _ => Status::Converged,
+    };
+    let Some((best, iterate)) = search.best else {
+        return Err(Error::Infeasible(infeasible(&robot, torque.as_ref(), &info, &limits)));
+    };
+    let fourier = settle(&robot, settings, &basis, &limits, iterate.x)?;
+    let trajectory = Trajectory {
+        periods: settings.periods,
+        ends: settings.ends,
+        grid: settings.grid,
+        settings: serde_json::to_value(settings).unwrap_or_default(),
+        ..Trajectory::new(&robot, fourier)
+    };
+    let record = Record {
+        settings: settings.clone(),
+        status,
+        starts: search.starts,
+        best,
+        seconds: begin.elapsed().as_secs_f64(),
+    };
+    Ok(Design { robot, trajectory, value: iterate.value.exp(), record })
+}
+
+/// Samples of a period in the optimiser: enough for the harmonics that trigonometric functions of
+/// the positions add, more where the sign of the velocity is a column.
+fn samples(robot: &Robot, harmonics: &[u32]) -> usize {
+    let most = harmonics.iter().copied().max().unwrap_or(1) as usize;
+    let coulomb = robot.joints.iter().any(|j| j.identify[JointTerm::Coulomb as usize]);
+    (most * if coulomb { 36 } else { 20 }).clamp(64, 8000)
+}
+
+/// State of the rounds.
+#[derive(Default)]
+struct Search {
+    next: usize,
+    best: Option<(usize, Iterate)>,
+    starts: Vec<record::Start>,
+}
+
+impl Search {
+    /// One round: starts, first phase, the best to the end.
+    fn round(
+        &mut self,
+        source: &start::Source,
+        most: usize,
+        halt: &(dyn Fn() -> bool + Sync),
+        report: &(dyn Fn(usize, f64) + Sync),
+    ) -> Result<()> {
+        let task = source.task;
+        let first = self.next;
+        let size = ROUND.0.min(most - first);
+        self.next += size;
+        let incumbent = self.best.as_ref().map(|(_, b)| b);
+        let begun: Vec<Option<(usize, Iterate, bool)>> = (first..first + size)
+            .into_par_iter()
+            .map(|number| {
+                // every other start of the later rounds disturbs the best so far
+                let x = match incumbent {
+                    Some(b) if number % 2 == 1 => Some(source.disturbed(&b.x, number)),
+                    _ => source.random(number, CANDIDATES, halt),
+                };
+                let Some(x) = x else { return Ok(None) };
+                let mut it = Iterate::new(task, x);
+                let stop = Stop { iterations: 120, gain: 1e-2 };
+                it.run(task, Phase::Smooth(NORMS.0), stop, halt)?;
+                Ok(Some((number, it, false)))
+            })
+            .collect::<Result<_>>()?;
+        let mut begun: Vec<_> = begun.into_iter().flatten().collect();
+        begun.sort_by(|a, b| a.1.value.total_cmp(&b.1.value).then(a.0.cmp(&b.0)));
+        begun.par_iter_mut().take(ROUND.1).try_for_each(|(_, it, done)| -> Result<()> {
+            let stop = Stop { iterations: 150, gain: 2e-3 };
+            it.run(task, Phase::Smooth(NORMS.1), stop, halt)?;
+            let stop = Stop { iterations: 60, gain: 5e-4 };
+            *done = it.run(task, Phase::Exact, stop, halt)?;
+            Ok(())
+        })?;
+        begun.sort_by_key(|b| b.0);
+        for (number, it, converged) in begun {
+            let history = it.history.iter().map(|v| v.exp().min(1e300)).collect();
+            self.starts.push(record::Start { number, history, converged });
+            if self.best.as_ref().is_none_or(|(_, b)| it.value < b.value) {
+                self.best = Some((number, it));
+            }
+        }
+        if let Some((_, b)) = &self.best {
+            report(self.next, b.value);
+        }
+        Ok(())
+    }
+}
+
+/// Rounds off: end conditions to the last digit, and the motion shrunk about its rest by
+/// thousandths while the certificate, torques between the samples included, finds anything.
+fn settle(
+    robot: &Robot,
+    settings: &Settings,
+    basis: &Basis,
+    limits: &Limits,
+    mut x: Vec<f64>,
+) -> Result<crate::trajectory::Fourier> {
+    let mut derated = robot.clone();
+    for joint in &mut derated.joints {
+        joint.limits.effort *= settings.derate;
+    }
+    let tree = Tree::new(robot);
+    let m = basis.free();
+    for attempt in 0..200 {
+        let fourier = basis.fourier(settings.period, &x);
+        if attempt == 199 || certificate(&derated, &tree, &fourier)?.satisfied {
+            return Ok(fourier);
+        }
+        for j in 0..robot.dof() {
+            let rest = limits.rest_parameters(j);
+            let x_j = &mut x[j * m..(j + 1) * m];
+            x_j.iter_mut().zip(rest).for_each(|(x, r)| *x = r + 0.998 * (*x - r));
+        }
+    }
+    Ok(basis.fourier(settings.period, &x))
+}
+
+/// Why there is no feasible trajectory.
+fn infeasible(
+    robot: &Robot,
+    torque: Option<&TorqueLimits>,
+    info: &Information,
+    limits: &Limits,
+) -> String {
+    let rest: Vec<f64> = (0..robot.dof()).flat_map(|j| limits.rest_parameters(j)).collect();
+    if let Some(t) = torque {
+        let mut motion = Default::default();
+        let mut tau = Vec::new();
+        info.sample(&rest, &mut motion);
+        t.torques(info, &motion, &mut Default::default(), &mut tau);
+        let (used, j) = t.worst(&tau);
+        if used > 1.0 {
+            return format!(
+                "{}: no feasible trajectory: at rest in the middle of its range {} already needs \
+                 {:.0} % of its effort limit ({} N m or N); check masses, gravity, the limit, or \
+                 choose a start posture",
+                robot.name,
+                robot.joints[j].name,
+                100.0 * used,
+                robot.joints[j].limits.effort
+            );
+        }
+    }
+    format!("{}: no feasible trajectory was found; check the limits and the start posture", robot.name)
+}

@@ -29,10 +29,10 @@ pub struct Settings {
     pub derate: f64,
     /// seed of the random starts
     pub seed: u64,
-    /// most starts that are followed
-    pub starts: usize,
-    /// wall clock of the optimisation, s
-    pub time_limit: f64,
+    /// most starts; where neither this nor a time limit is given, 16 within 60 s
+    pub starts: Option<usize>,
+    /// wall clock of the optimisation, s; given alone, starts go on until it ends
+    pub time_limit: Option<f64>,
     /// threads; 0 for one per core
     pub threads: usize,
 }
@@ -50,14 +50,24 @@ impl Default for Settings {
             condition: Condition::Invariant,
             derate: 1.0,
             seed: 1,
-            starts: 16,
-            time_limit: 10.0,
+            starts: None,
+            time_limit: None,
             threads: 0,
         }
     }
 }
 
 impl Settings {
+    /// Most starts and seconds, with the defaults filled in.
+    pub fn budget(&self) -> (usize, f64) {
+        match (self.starts, self.time_limit) {
+            (None, None) => (16, 60.0),
+            (Some(starts), None) => (starts, f64::INFINITY),
+            (None, Some(seconds)) => (usize::MAX, seconds),
+            (Some(starts), Some(seconds)) => (starts, seconds),
+        }
+    }
+
     /// Checks the settings against each other and against the robot.
     ///
     /// # Errors
@@ -90,17 +100,13 @@ impl Settings {
                 self.derate
             ));
         }
-        if self.starts == 0 || self.starts > 1_000_000 {
-            return bad(format!(
-                "starts must be between 1 and 1000000, not {}",
-                self.starts
-            ));
+        if self.starts.is_some_and(|s| s == 0 || s > 1_000_000) {
+            return bad("starts must be between 1 and 1000000".into());
         }
-        if self.time_limit.is_nan() || self.time_limit <= 0.0 {
-            return bad(format!(
-                "time limit must be more than 0 s, not {}",
-                self.time_limit
-            ));
+        if let Some(t) = self.time_limit
+            && (t.is_nan() || t <= 0.0)
+        {
+            return bad(format!("time limit must be more than 0 s, not {t}"));
         }
         if self.threads > 1024 {
             return bad(format!(

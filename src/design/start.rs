@@ -1,8 +1,8 @@
-//! Feasible random starts.
+//! Feasible starts: random ones, and disturbed copies of the best so far.
 
-use super::information::Information;
-use super::limits::{ExtremaWork, Limits};
-use super::torque::TorqueLimits;
+use super::information::Evaluation;
+use super::limits::ExtremaWork;
+use super::solve::Task;
 use crate::dynamics::Samples;
 use crate::robot::{Motion, Robot};
 use crate::trajectory::Basis;
@@ -18,82 +18,121 @@ pub fn scales(robot: &Robot, period: f64) -> Vec<f64> {
         .iter()
         .map(|j| {
             let [low, high] = j.limits.position;
-            let free = if j.motion == Motion::Revolute {
-                std::f64::consts::PI
-            } else {
-                0.5
-            };
+            let free = if j.motion == Motion::Revolute { std::f64::consts::PI } else { 0.5 };
             let half = 0.5 * (high - low);
-            let half = if half.is_finite() {
-                half.min(2.0 * free)
-            } else {
-                free
-            };
+            let half = if half.is_finite() { half.min(2.0 * free) } else { free };
             half.min(j.limits.velocity / omega).max(1e-6)
         })
         .collect()
 }
 
-/// A random trajectory inside the limits, made from its own stream of random numbers.
-///
-/// Amplitudes are drawn with falling weight in the harmonic, the middle of the motion near the
-/// middle of the range, and the motion of each joint is scaled up to the limit that it meets
-/// first, times a random factor; then all joints are shrunk until the torques fit. `None` where
-/// they do not fit even at rest there.
-pub fn random(
-    robot: &Robot,
-    basis: &Basis,
-    info: &Information,
-    limits: &Limits,
-    torque: Option<&TorqueLimits>,
-    scale: &[f64],
-    seed: u64,
-) -> Option<Vec<f64>> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let (m, h) = (basis.free(), basis.harmonics.len());
-    let mut work = ExtremaWork::default();
-    let mut x = vec![0.0; info.len()];
-    let mut centre = vec![0.0; info.len()];
-    for (j, joint) in robot.joints.iter().enumerate() {
-        let half = match joint.limits.position {
-            [low, high] if high - low < f64::INFINITY => 0.5 * (high - low),
-            _ => scale[j],
-        };
-        let rest = limits.rest_parameters(j);
-        let mut c = vec![0.0; 2 * h + 1];
-        c[0] = limits.rest(j) + half * rng.random_range(-0.3..0.3);
-        for k in 0..h {
-            let weight = 1.0 / f64::from(basis.harmonics[k]).sqrt();
-            for at in [1 + k, 1 + h + k] {
-                c[at] = scale[j] * weight * rng.random_range(-1.0..1.0);
+/// Where starts come from. Each has a number, and with it its own stream of random numbers.
+pub struct Source<'a> {
+    /// the robot
+    pub robot: &'a Robot,
+    /// parametrisation
+    pub basis: &'a Basis,
+    /// the problem
+    pub task: &'a Task<'a>,
+    /// seed of the design
+    pub seed: u64,
+}
+
+impl Source<'_> {
+    fn stream(&self, number: usize) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(number as u64 + 1);
+        rng
+    }
+
+    /// The best of several random trajectories; `None` where none is feasible.
+    pub fn random(
+        &self,
+        number: usize,
+        candidates: usize,
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<f64>> {
+        let mut rng = self.stream(number);
+        let mut e = Evaluation::default();
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        for _ in 0..candidates {
+            if best.is_some() && halt() {
+                break;
+            }
+            let Some(x) = self.candidate(&mut rng) else { continue };
+            let value = self.task.objective.evaluate(self.task.info, &x, &mut e);
+            if best.as_ref().is_none_or(|b| value < b.0) {
+                best = Some((value, x));
             }
         }
-        let full = basis.parameters(j, &c);
-        // the multiple of the motion about its rest that touches a limit, times a random factor
-        let gauge = limits.gauge(j, full.as_slice(), &mut work);
-        let factor = rng.random_range(0.6..0.98) / gauge.max(1e-9);
-        for k in 0..m {
-            centre[j * m + k] = rest[k];
-            x[j * m + k] = rest[k] + factor * (full[k] - rest[k]);
-        }
+        best.map(|b| b.1)
     }
-    if let Some(t) = torque {
+
+    /// A disturbed copy of a feasible trajectory, feasible too.
+    pub fn disturbed(&self, x: &[f64], number: usize) -> Vec<f64> {
+        let mut rng = self.stream(number);
+        let m = self.basis.free();
+        let size = rng.random_range(0.05..0.35);
+        let mut next: Vec<f64> = x
+            .iter()
+            .enumerate()
+            .map(|(k, x)| x + size * self.task.scale[k / m] * rng.random_range(-1.0..1.0))
+            .collect();
+        self.task.limits.pull_inside(&mut next, &mut ExtremaWork::default());
+        self.fit_torques(&next, x).unwrap_or_else(|| x.to_vec())
+    }
+
+    /// A random trajectory inside the limits.
+    ///
+    /// Amplitudes fall with the harmonic, the middle of the motion lies near the middle of the
+    /// range, and the motion of each joint is scaled to the limit that it meets first, times a
+    /// random factor; then all joints are shrunk until the torques fit. `None` where they do not
+    /// fit even at rest.
+    fn candidate(&self, rng: &mut ChaCha8Rng) -> Option<Vec<f64>> {
+        let (basis, limits) = (self.basis, self.task.limits);
+        let (m, h) = (basis.free(), basis.harmonics.len());
+        let mut work = ExtremaWork::default();
+        let mut x = Vec::with_capacity(self.task.info.len());
+        let mut rest = Vec::with_capacity(self.task.info.len());
+        for (j, joint) in self.robot.joints.iter().enumerate() {
+            let scale = self.task.scale[j];
+            let half = match joint.limits.position {
+                [low, high] if high - low < f64::INFINITY => 0.5 * (high - low),
+                _ => scale,
+            };
+            let mut c = vec![0.0; 2 * h + 1];
+            c[0] = limits.rest(j) + half * rng.random_range(-0.3..0.3);
+            for k in 0..h {
+                let weight = 1.0 / f64::from(basis.harmonics[k]).sqrt();
+                for at in [1 + k, 1 + h + k] {
+                    c[at] = scale * weight * rng.random_range(-1.0..1.0);
+                }
+            }
+            let full = basis.parameters(j, &c);
+            let gauge = limits.gauge(j, full.as_slice(), &mut work);
+            let factor = rng.random_range(0.6..0.98) / gauge.max(1e-9);
+            let still = limits.rest_parameters(j);
+            x.extend((0..m).map(|k| still[k] + factor * (full[k] - still[k])));
+            rest.extend(still);
+        }
+        self.fit_torques(&x, &rest)
+    }
+
+    /// The largest of a few steps from a feasible trajectory towards another whose torques fit.
+    fn fit_torques(&self, x: &[f64], from: &[f64]) -> Option<Vec<f64>> {
+        let Some(limits) = self.task.torque else { return Some(x.to_vec()) };
         let (mut motion, mut ws, mut tau) = (Samples::default(), Default::default(), Vec::new());
-        let mut f = 1.0;
-        for attempt in 0..40 {
-            let trial: Vec<f64> = x
-                .iter()
-                .zip(&centre)
-                .map(|(x, c)| c + f * (x - c))
-                .collect();
-            info.sample(&trial, &mut motion);
-            t.torques(info, &motion, &mut ws, &mut tau);
-            if t.worst(&tau).0 <= 1.0 {
+        let mut fraction = 1.0;
+        for attempt in 0..30 {
+            let trial: Vec<f64> =
+                x.iter().zip(from).map(|(x, r)| r + fraction * (x - r)).collect();
+            self.task.info.sample(&trial, &mut motion);
+            limits.torques(self.task.info, &motion, &mut ws, &mut tau);
+            if limits.worst(&tau).0 <= 1.0 {
                 return Some(trial);
             }
-            f = if attempt == 38 { 0.0 } else { f * 0.85 };
+            fraction = if attempt == 28 { 0.0 } else { fraction * 0.8 };
         }
-        return None;
+        None
     }
-    Some(x)
 }

@@ -89,6 +89,22 @@ struct Entry {
 }
 
 impl Trajectory {
+    /// One period of a motion of this robot; the other fields can be set afterwards.
+    pub fn new(robot: &Robot, fourier: Fourier) -> Self {
+        Trajectory {
+            robot: robot.name.clone(),
+            robot_hash: robot.hash.clone(),
+            joints: robot.joint_names(),
+            kind: Kind::Fourier,
+            fourier,
+            periods: 1,
+            ends: Ends::Free,
+            grid: Grid::Full,
+            settings: serde_json::Value::Null,
+            excite_version: env!("CARGO_PKG_VERSION").into(),
+        }
+    }
+
     /// Duration of all periods, s.
     pub fn duration(&self) -> f64 {
         self.fourier.period * f64::from(self.periods)
