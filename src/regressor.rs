@@ -2,7 +2,7 @@
 //! of every link and the joint columns that the robot asks for.
 
 use crate::dynamics::{Samples, Tree};
-use crate::robot::{Column, JointTerm, Robot};
+use crate::robot::{Column, Joint, JointTerm, Robot};
 use faer::{Mat, MatRef};
 
 /// `W`, stacked joint-major: row `j·count + i` is coordinate `j` at sample `i`; columns as in
@@ -89,13 +89,40 @@ pub fn nominal_torque(robot: &Robot, tree: &Tree, motion: &Samples) -> Vec<f64> 
     tree.inverse_dynamics(&mut Default::default(), &phi, motion, &mut tau);
     for (j, joint) in robot.joints.iter().enumerate() {
         for i in 0..motion.count {
-            let state = motion.at(j, i);
-            tau[j * motion.count + i] += JointTerm::ALL
-                .into_iter()
-                .zip(joint.terms)
-                .map(|(term, value)| value * term_factor(term, state))
-                .sum::<f64>();
+            tau[j * motion.count + i] += joint_torque(joint, motion.at(j, i));
         }
     }
     tau
+}
+
+/// The nominal torque of one state as a function, for
+/// [`write_samples`](crate::trajectory::samples::write_samples) and the like.
+pub fn torque_function<'a>(
+    robot: &'a Robot,
+    tree: &'a Tree,
+) -> impl Fn(&[f64], &[f64], &[f64], &mut [f64]) + 'a {
+    let phi: Vec<f64> = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
+    let memory = std::cell::RefCell::new((
+        crate::dynamics::Workspace::default(),
+        Samples::zeros(robot.dof(), 1),
+    ));
+    move |q, qd, qdd, tau| {
+        let (ws, s) = &mut *memory.borrow_mut();
+        s.q.copy_from_slice(q);
+        s.qd.copy_from_slice(qd);
+        s.qdd.copy_from_slice(qdd);
+        tree.inverse_dynamics(ws, &phi, s, tau);
+        for (j, joint) in robot.joints.iter().enumerate() {
+            tau[j] += joint_torque(joint, s.at(j, 0));
+        }
+    }
+}
+
+/// Sum of the joint terms of the nominal model: armature, friction, offset.
+pub fn joint_torque(joint: &Joint, state: [f64; 3]) -> f64 {
+    JointTerm::ALL
+        .into_iter()
+        .zip(joint.terms)
+        .map(|(term, value)| value * term_factor(term, state))
+        .sum()
 }

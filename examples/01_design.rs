@@ -1,0 +1,30 @@
+//! The main job as a library call: a robot, a trajectory, a proof.
+
+use excite::design::{Settings, design};
+use excite::identifiability::Assessment;
+use excite::{Error, Robot};
+use std::sync::atomic::AtomicBool;
+
+fn main() -> Result<(), Error> {
+    let robot = Robot::load("ur10e")?;
+    let settings = Settings {
+        starts: Some(4),
+        ..Settings::default()
+    };
+    let result = design(&robot, &settings, &AtomicBool::new(false), &|_| {})?;
+
+    let report = Assessment::new(&result.robot, &result.trajectory)?;
+    let Some(excitation) = &report.excitation else {
+        return Ok(());
+    };
+    println!("base parameters   {}", report.base.count());
+    println!("condition number  {:.3}", excitation.condition.invariant);
+    println!("inside all limits {}", excitation.certificate.satisfied);
+    for p in excitation.predictions.iter().take(3) {
+        println!(
+            "hardest           {} (std {:.2e} {})",
+            p.combination, p.std, p.unit
+        );
+    }
+    Ok(())
+}

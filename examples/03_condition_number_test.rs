@@ -1,0 +1,33 @@
+//! A condition number asserted in an automated test, as a user would write it: the trajectory that
+//! is checked in must keep exciting the robot, and must stay inside its limits.
+//!
+//! `cargo test --release --example 03_condition_number_test`
+
+use excite::identifiability::{Assessment, Excitation};
+use excite::trajectory::Trajectory;
+use excite::{Error, Robot};
+
+fn assess() -> Result<Excitation, Error> {
+    let robot = Robot::load("panda")?;
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/trajectories/panda/trajectory.json");
+    let trajectory = Trajectory::read(path)?;
+    Assessment::new(&robot, &trajectory)?
+        .excitation
+        .ok_or_else(|| Error::Argument("no trajectory".into()))
+}
+
+fn main() -> Result<(), Error> {
+    let e = assess()?;
+    println!(
+        "condition number {:.3}, limits hold: {}",
+        e.condition.invariant, e.certificate.satisfied
+    );
+    Ok(())
+}
+
+#[test]
+fn panda_trajectory_excites_and_is_safe() {
+    let e = assess().expect("robot and trajectory are there");
+    assert!(e.condition.invariant < 6.5, "{}", e.condition.invariant);
+    assert!(e.certificate.satisfied);
+}

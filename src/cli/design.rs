@@ -1,0 +1,175 @@
+//! `excite design ROBOT`.
+
+use super::{load, pretty, print, summary::summary, warn, write};
+use excite::design::{Condition, Criterion, Progress, Settings, design};
+use excite::dynamics::Tree;
+use excite::identifiability::Assessment;
+use excite::output::prepare_dir;
+use excite::report::before;
+use excite::trajectory::samples::write_samples;
+use excite::trajectory::{Ends, Grid};
+use excite::{Error, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Design an exciting trajectory and report on it before the run.
+#[derive(clap::Args)]
+#[command(
+    long_about = "Design an exciting trajectory: a Fourier series for each joint that minimises the \
+                  condition number of the regressor (or another criterion), inside position, \
+                  velocity, acceleration, jerk and torque limits for all time.\n\nWrites \
+                  trajectory.json, samples.csv, report.json and report.html. Ctrl-C keeps the best \
+                  trajectory found so far.",
+    after_help = "Examples:\n  excite design panda --output out\n  excite design robot.toml --harmonics 7 \
+                  --period 20 --derate 0.8 --time-limit 60\n  excite design arm.urdf --criterion d \
+                  --identify armature,viscous,coulomb"
+)]
+pub struct Args {
+    /// Bundled robot, robot.toml or URDF
+    robot: String,
+    /// Directory for the results
+    #[arg(short, long, default_value = "out")]
+    output: PathBuf,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+    /// Harmonics of the Fourier series of each joint
+    #[arg(long, default_value_t = 5)]
+    harmonics: usize,
+    /// Period in seconds
+    #[arg(long, default_value_t = 10.0, allow_negative_numbers = true)]
+    period: f64,
+    /// Periods of the experiment
+    #[arg(long, default_value_t = 1)]
+    periods: u32,
+    /// Harmonics used: full (1, 2, 3, …), odd, or random-odd (odd with one in four left out)
+    #[arg(long, default_value = "full")]
+    grid: Grid,
+    /// Ends: rest (zero velocity and acceleration) or free
+    #[arg(long, default_value = "rest")]
+    ends: Ends,
+    /// Posture at the start, rad or m, one number per joint [default: free]
+    #[arg(long, value_name = "Q1,Q2,…", value_delimiter = ',', allow_hyphen_values = true)]
+    start: Option<Vec<f64>>,
+    /// Criterion: condition, d, a or e
+    #[arg(long, default_value = "condition", value_parser = named::<Criterion>)]
+    criterion: Criterion,
+    /// Matrix judged: invariant, raw, normalised or weighted
+    #[arg(long, default_value = "invariant", value_parser = named::<Condition>)]
+    condition: Condition,
+    /// Fraction of every limit that may be used
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    derate: f64,
+    /// Rate of samples.csv in Hz
+    #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
+    rate: f64,
+    /// Seed of the random starts
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Most starts [default: 16, or no limit where a time limit is given]
+    #[arg(long)]
+    starts: Option<usize>,
+    /// Wall clock of the optimisation in seconds [default: 60, or none where starts are given]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    time_limit: Option<f64>,
+    /// Threads, 0 for one per core
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Joint columns beside the ten of each link, for all joints: armature, viscous, coulomb,
+    /// offset, or none [default: as in the robot file]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    identify: Option<Vec<String>>,
+    /// Print report.json to standard output instead of a summary
+    #[arg(long)]
+    json: bool,
+}
+
+/// A value by its name in the settings.
+fn named<T: serde::de::DeserializeOwned>(text: &str) -> std::result::Result<T, String> {
+    serde_json::from_value(serde_json::Value::String(text.into())).map_err(|e| e.to_string())
+}
+
+pub fn run(args: Args) -> Result<()> {
+    let begin = Instant::now();
+    let robot = load(&args.robot, args.identify.as_deref())?;
+    let settings = Settings {
+        harmonics: args.harmonics,
+        period: args.period,
+        periods: args.periods,
+        grid: args.grid,
+        ends: args.ends,
+        start: args.start,
+        criterion: args.criterion,
+        condition: args.condition,
+        derate: args.derate,
+        seed: args.seed,
+        starts: args.starts,
+        time_limit: args.time_limit,
+        threads: args.threads,
+    };
+    settings.check(&robot)?;
+    let length = args.rate * settings.period * f64::from(settings.periods);
+    if !(args.rate > 0.0 && args.rate.is_finite() && length <= 1e8) {
+        return Err(Error::Argument(format!(
+            "--rate must be more than 0 and give at most 1e8 samples, not {}",
+            args.rate
+        )));
+    }
+    let names = ["trajectory.json", "samples.csv", "report.json", "report.html"];
+    let files = prepare_dir(&args.output, &names, args.force)?;
+
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let flag = interrupt.clone();
+    // a second Ctrl-C ends the program at once
+    let handler = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    if ctrlc::set_handler(handler).is_err() {
+        eprintln!("warning: Ctrl-C cannot be caught here; it will lose the trajectory");
+    }
+    let bar = bar(&settings);
+    let progress = |p: Progress| {
+        bar.set_position(match p.planned {
+            Some(_) => p.starts as u64,
+            None => (p.seconds * 1000.0) as u64,
+        });
+        bar.set_message(format!("{} starts, best {:.4}", p.starts, p.best));
+    };
+    let result = design(&robot, &settings, &interrupt, &progress);
+    bar.finish_and_clear();
+    let result = result?;
+
+    let assessment = Assessment::new(&result.robot, &result.trajectory)?;
+    warn(&assessment.warnings);
+    result.trajectory.write(&files[0], args.force)?;
+    let tree = Tree::new(&result.robot);
+    let torque = excite::regressor::torque_function(&result.robot, &tree);
+    let fourier = &result.trajectory.fourier;
+    write_samples(&files[1], args.force, fourier, settings.periods, args.rate, Some(&torque))?;
+    let json = before::json(&assessment, Some(&result.record), begin.elapsed().as_secs_f64());
+    write(&files[2], args.force, &pretty(&json))?;
+    write(&files[3], args.force, &before::html(&assessment, Some(&result.record)))?;
+    match args.json {
+        true => print(&pretty(&json)),
+        false => print(&summary(&assessment, Some(&result.record), &files)),
+    }
+}
+
+fn bar(settings: &Settings) -> ProgressBar {
+    let (starts, seconds) = settings.budget();
+    let (length, template) = match starts {
+        usize::MAX => ((seconds * 1000.0) as u64, "{bar:30} {elapsed}  {msg}"),
+        n => (n as u64, "{bar:30} {pos}/{len} starts, {elapsed}  {msg}"),
+    };
+    let bar = ProgressBar::new(length);
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar
+}

@@ -1,0 +1,105 @@
+//! The command line. Exit status: 0 done, 1 could not do it (the reason on standard error), 2
+//! unusable arguments. Nothing but results goes to standard output.
+
+mod design;
+mod identifiability;
+mod new;
+mod robots;
+mod summary;
+mod torque;
+
+use clap::{Parser, Subcommand};
+use excite::robot::{JointTerm, Robot};
+use excite::{Error, Result, Warning};
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Exciting trajectories for robots: designed, and proven inside the limits, before the run.
+#[derive(Parser)]
+#[command(name = "excite", version, max_term_width = 90, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Design an exciting trajectory and report on it before the run
+    Design(design::Args),
+    /// Report what a robot, and a trajectory on it, can identify
+    Identifiability(identifiability::Args),
+    /// Print the inverse dynamics of a sampled motion
+    Torque(torque::Args),
+    /// List the bundled robots
+    Robots(robots::Args),
+    /// Print a commented robot.toml for a URDF
+    New(new::Args),
+}
+
+/// Runs the program.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Command::Design(a) => design::run(a),
+        Command::Identifiability(a) => identifiability::run(a),
+        Command::Torque(a) => torque::run(a),
+        Command::Robots(a) => robots::run(a),
+        Command::New(a) => new::run(a),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: {e}");
+            ExitCode::from(if e.is_argument() { 2 } else { 1 })
+        }
+    }
+}
+
+/// Prints to standard output; a reader that went away (`| head`) ends the program quietly.
+fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+        other => other.map_err(|e| Error::io("standard output", e)),
+    }
+}
+
+/// Prints warnings to standard error, the first few in full.
+fn warn(warnings: &[Warning]) {
+    const MOST: usize = 12;
+    for w in warnings.iter().take(MOST) {
+        eprintln!("warning: {w}");
+    }
+    if warnings.len() > MOST {
+        eprintln!("warning: and {} more, all of them in the report", warnings.len() - MOST);
+    }
+}
+
+/// A robot, with other joint columns where the command line asks for them.
+fn load(spec: &str, identify: Option<&[String]>) -> Result<Robot> {
+    let robot = Robot::load(spec)?;
+    let Some(names) = identify else { return Ok(robot) };
+    let mut terms = Vec::new();
+    for name in names.iter().filter(|n| n.as_str() != "none") {
+        match JointTerm::ALL.into_iter().find(|t| t.name() == name) {
+            Some(t) => terms.push(t),
+            None => {
+                return Err(Error::Argument(format!(
+                    "--identify knows armature, viscous, coulomb, offset and none, not `{name}`"
+                )));
+            }
+        }
+    }
+    Ok(robot.with_terms(&terms))
+}
+
+/// Writes a text file into a prepared directory.
+fn write(path: &Path, force: bool, text: &str) -> Result<()> {
+    excite::output::write_atomic(path, force, |w| w.write_all(text.as_bytes()))
+}
+
+/// JSON with a newline at the end.
+fn pretty(value: &serde_json::Value) -> String {
+    format!("{value:#}\n")
+}

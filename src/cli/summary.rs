@@ -1,0 +1,76 @@
+//! What is printed when all is written: 80 columns, the verdict in words.
+
+use excite::base::Identifiability;
+use excite::design::{Record, Status};
+use excite::identifiability::{Assessment, Excitation};
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Summary of a report before the run.
+pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBuf]) -> String {
+    let mut out = String::new();
+    let base = &assessment.base;
+    let felt =
+        base.standard.iter().filter(|s| s.identifiability != Identifiability::None).count();
+    let _ = writeln!(
+        out,
+        "{}: {} joints; {felt} of {} parameters are felt, in {} base parameters",
+        assessment.robot.name,
+        assessment.robot.dof(),
+        base.names.len(),
+        base.count(),
+    );
+    if let Some(e) = &assessment.excitation {
+        out.push_str(&excitation(e));
+    }
+    if let Some(r) = record {
+        let how = match r.status {
+            Status::Converged => "all starts followed to their end",
+            Status::TimeLimit => "ended by the time limit",
+            Status::Interrupted => "interrupted; this is the best so far",
+        };
+        let _ = writeln!(out, "design: {} starts in {:.1} s, {how}", r.starts.len(), r.seconds);
+    }
+    for f in files {
+        let _ = writeln!(out, "wrote {}", f.display());
+    }
+    out
+}
+
+fn excitation(e: &Excitation) -> String {
+    let mut out = String::new();
+    let c = &e.condition;
+    let _ = writeln!(
+        out,
+        "condition number {:.3} (raw {:.3}, normalised {:.3}, weighted {:.3})",
+        c.invariant, c.raw, c.normalised, c.weighted
+    );
+    let verdict = match e.certificate.satisfied {
+        true => "all hold for all time",
+        false => "EXCEEDED, do not run this",
+    };
+    let _ = match &e.certificate.worst {
+        Some(w) => writeln!(
+            out,
+            "limits: {verdict}; closest: {} of {} at {:.1} %",
+            w.kind.name(),
+            w.joint,
+            100.0 * w.used
+        ),
+        None => writeln!(out, "limits: none stated"),
+    };
+    if let Some(p) = e.predictions.first() {
+        let good = e.predictions.iter().filter(|p| p.percent.is_some_and(|x| x <= 10.0)).count();
+        let worst = match p.percent {
+            Some(x) => format!("{x:.1} %"),
+            None => format!("{:.2e} {} about 0", p.std, p.unit),
+        };
+        let _ = writeln!(
+            out,
+            "predicted: {good} of {} base parameters to 10 % or better; worst {}: {worst}",
+            e.predictions.len(),
+            p.parameter
+        );
+    }
+    out
+}
