@@ -254,17 +254,20 @@ impl BaseParameters {
         self.kept.len()
     }
 
-    /// Base parameters of given standard parameters: `π_b = φ_kept + K φ_dropped`.
+    /// Base parameters of given standard parameters: `π_b = φ_kept + K φ_dropped`. Terms that
+    /// cancel to rounding (below 1e-12 of their size) give exactly 0, so that nothing is taken
+    /// relative to what is left of them.
     pub fn project(&self, phi: &[f64]) -> Vec<f64> {
         (0..self.count())
             .map(|a| {
-                phi[self.kept[a]]
-                    + self
-                        .dropped
-                        .iter()
-                        .enumerate()
-                        .map(|(d, &j)| self.k[(a, d)] * phi[j])
-                        .sum::<f64>()
+                let first = phi[self.kept[a]];
+                let (mut sum, mut size) = (first, first.abs());
+                for (d, &j) in self.dropped.iter().enumerate() {
+                    let term = self.k[(a, d)] * phi[j];
+                    sum += term;
+                    size += term.abs();
+                }
+                if sum.abs() <= 1e-12 * size { 0.0 } else { sum }
             })
             .collect()
     }

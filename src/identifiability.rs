@@ -225,8 +225,9 @@ pub fn condition_numbers(
     let invariant = singular_values((w.mat() * &base.row_space).as_ref())?;
     let kept = base.select(w.mat());
     let raw = singular_values(kept.as_ref())?;
-    let norms: Vec<f64> =
-        (0..kept.ncols()).map(|j| kept.col(j).norm_l2().max(f64::MIN_POSITIVE)).collect();
+    let norms: Vec<f64> = (0..kept.ncols())
+        .map(|j| kept.col(j).norm_l2().max(f64::MIN_POSITIVE))
+        .collect();
     let unit = Mat::from_fn(kept.nrows(), kept.ncols(), |i, j| kept[(i, j)] / norms[j]);
     let normalised = singular_values(unit.as_ref())?;
     let weighted = singular_values(base.select(w.weighted(torque_noise).as_ref()).as_ref())?;

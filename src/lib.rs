@@ -10,6 +10,7 @@ pub mod error;
 pub mod identifiability;
 pub mod output;
 pub mod regressor;
+pub mod report;
 pub mod robot;
 pub mod trajectory;
 

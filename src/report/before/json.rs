@@ -1,0 +1,228 @@
+//! `report.json` of `design` and `identifiability`.
+
+use super::reproduce::seed;
+use super::verdict::{verdict, violations};
+use crate::design::record::Record;
+use crate::identifiability::{Assessment, Excitation};
+use crate::trajectory::certificate::{JointCertificate, Peak};
+use serde_json::{Map, Value, json};
+
+/// What stands for infinity: JSON has none.
+const INFINITE: f64 = 1e300;
+
+/// A number that JSON can hold: infinities become ±1e300, and what is not a number, being an
+/// uncertainty or a ratio that could not be had, 1e300.
+fn number(x: f64) -> Value {
+    let x = match x.is_nan() {
+        true => INFINITE,
+        false => x.clamp(-INFINITE, INFINITE),
+    };
+    json!(x)
+}
+
+fn optional(x: Option<f64>) -> Value {
+    x.map_or(Value::Null, number)
+}
+
+fn numbers(all: &[f64]) -> Value {
+    all.iter().copied().map(number).collect()
+}
+
+/// The report as JSON; `seconds` is the wall clock of the whole command.
+///
+/// Every number is finite (±1e300 stands for infinity). `null` means that there is none: what
+/// needs a trajectory where there is no trajectory, a limit that is not stated, a percentage of
+/// zero.
+pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> Value {
+    let a = assessment;
+    let e = a.excitation.as_ref();
+    let mut out = Map::new();
+    let mut put = |key: &str, value: Value| {
+        out.insert(key.into(), value);
+    };
+    put("robot", json!(a.robot.name));
+    put("joints", json!(a.robot.joint_names()));
+    put("base_parameters", json!(a.base.count()));
+    put("rank_gap", number(a.base.rank_gap));
+    put(
+        "condition_number",
+        e.map_or(Value::Null, |e| {
+            json!({
+                "invariant": number(e.condition.invariant),
+                "raw": number(e.condition.raw),
+                "normalised": number(e.condition.normalised),
+                "weighted": number(e.condition.weighted),
+            })
+        }),
+    );
+    // of an information matrix that is singular, or too large to tell: minus infinity
+    let log_det = |x: f64| if x.is_nan() { -INFINITE } else { x };
+    put(
+        "log_det",
+        e.map_or(Value::Null, |e| number(log_det(e.log_det))),
+    );
+    put("relative_std", relative_std(a));
+    put("limits", e.map_or(Value::Null, |e| limits(a, e)));
+    put("seconds", number(seconds));
+    put("verdict", json!(verdict(a)));
+    put("torque_noise", numbers(&a.torque_noise));
+    put(
+        "singular_values",
+        json!({
+            "random_states": numbers(&a.base.singular_values),
+            "trajectory": e.map_or(Value::Null, |e| numbers(&e.singular_values)),
+        }),
+    );
+    put("standard_parameters", json!(a.base.standard));
+    put("warnings", json!(a.warnings));
+    put("trajectory", e.map_or(Value::Null, trajectory));
+    put("version", json!(env!("CARGO_PKG_VERSION")));
+    put("robot_hash", json!(a.robot.hash));
+    put(
+        "settings",
+        match record {
+            Some(r) => json!(r.settings),
+            None => e.map_or(Value::Null, |e| e.trajectory.settings.clone()),
+        },
+    );
+    put("seed", json!(seed(a, record)));
+    put("status", json!(record.map(|r| r.status)));
+    put("starts", record.map_or(Value::Null, starts));
+    Value::Object(out)
+}
+
+/// Base parameters, worst predicted first; without a trajectory in their own order and without
+/// predictions.
+fn relative_std(a: &Assessment) -> Value {
+    match &a.excitation {
+        Some(e) => e
+            .predictions
+            .iter()
+            .map(|p| {
+                json!({
+                    "parameter": p.parameter,
+                    "combination": p.combination,
+                    "unit": p.unit,
+                    "nominal": number(p.nominal),
+                    "std": number(p.std),
+                    "percent": optional(p.percent),
+                })
+            })
+            .collect(),
+        None => {
+            let nominal = a.base.project(&a.robot.parameters());
+            (0..a.base.count())
+                .map(|k| {
+                    json!({
+                        "parameter": a.base.name(k),
+                        "combination": a.base.combination(k),
+                        "unit": a.base.units[a.base.kept[k]],
+                        "nominal": number(nominal[k]),
+                        "std": Value::Null,
+                        "percent": Value::Null,
+                    })
+                })
+                .collect()
+        }
+    }
+}
+
+/// The certificate.
+fn limits(a: &Assessment, e: &Excitation) -> Value {
+    let c = &e.certificate;
+    json!({
+        "satisfied": c.satisfied,
+        "worst": c.worst.as_ref().map(|w| json!({
+            "joint": w.joint,
+            "kind": w.kind,
+            "used": number(w.used),
+        })),
+        "violations": violations(&a.robot, e),
+        "joints": c.joints.iter().map(joint).collect::<Vec<_>>(),
+    })
+}
+
+fn joint(c: &JointCertificate) -> Value {
+    let p = &c.position;
+    json!({
+        "joint": c.joint,
+        "position": {
+            "min": { "time": number(p.min.time), "value": number(p.min.value) },
+            "max": { "time": number(p.max.time), "value": number(p.max.value) },
+            "bounds": numbers(&p.bounds),
+            "lower": optional(p.lower),
+            "upper": optional(p.upper),
+            "used": optional(p.used),
+            "margin": optional(p.margin),
+            "satisfied": p.satisfied(),
+        },
+        "velocity": peak(&c.velocity),
+        "acceleration": peak(&c.acceleration),
+        "jerk": peak(&c.jerk),
+        "torque": c.torque.as_ref().map(|t| json!({
+            "max_on_grid": number(t.max_on_grid),
+            "time": number(t.time),
+            "between_grid_bound": number(t.between_grid_bound),
+            "coulomb": number(t.coulomb),
+            "bound": number(t.bound()),
+            "samples": t.samples,
+            "limit": optional(t.limit),
+            "used": optional(t.used),
+            "margin": optional(t.margin),
+            "satisfied": t.satisfied(),
+        })),
+    })
+}
+
+fn peak(p: &Peak) -> Value {
+    json!({
+        "value": number(p.value),
+        "time": number(p.time),
+        "bound": number(p.bound),
+        "limit": optional(p.limit),
+        "used": optional(p.used),
+        "margin": optional(p.margin),
+        "satisfied": p.satisfied(),
+    })
+}
+
+fn trajectory(e: &Excitation) -> Value {
+    let t = &e.trajectory;
+    json!({
+        "period": number(t.fourier.period),
+        "periods": t.periods,
+        "harmonics": t.fourier.harmonics,
+        "grid": t.grid.name(),
+        "ends": t.ends.name(),
+        "samples": e.samples,
+        "robot_hash": t.robot_hash,
+        "excite_version": t.excite_version,
+    })
+}
+
+/// The starts of a design, with the course of the one that gave the result.
+fn starts(r: &Record) -> Value {
+    let all: Vec<Value> = r
+        .starts
+        .iter()
+        .map(|s| {
+            json!({
+                "number": s.number,
+                "converged": s.converged,
+                "iterations": s.history.len().saturating_sub(1),
+                "criterion": optional(s.history.last().copied()),
+            })
+        })
+        .collect();
+    let history = r
+        .starts
+        .iter()
+        .find(|s| s.number == r.best)
+        .map(|s| numbers(&s.history));
+    json!({
+        "best": r.best,
+        "seconds": number(r.seconds),
+        "followed": all,
+        "history": history,
+    })
+}

@@ -1,0 +1,215 @@
+//! The verdict in a sentence, built from the facts.
+
+use super::super::format::{count, percent, significant, unit_of, with_unit};
+use super::{KNOWN, parameters};
+use crate::identifiability::{Assessment, Excitation};
+use crate::robot::{Motion, Robot};
+use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
+
+/// Condition number from which a trajectory does not excite every base parameter.
+const UNEXCITED: f64 = 1e7;
+
+/// The verdict in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Grade {
+    /// limits hold, every base parameter is excited, at least half of them will be known
+    Worthwhile,
+    /// limits hold and every base parameter is excited, but most will hardly be known
+    Weak,
+    /// limits hold, but some base parameters are not excited
+    Unexciting,
+    /// some limit does not hold
+    Unsafe,
+    /// no trajectory was given
+    RobotAlone,
+}
+
+/// The verdict: a word and a sentence.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Verdict {
+    /// in a word
+    pub grade: Grade,
+    /// in a sentence
+    pub text: String,
+}
+
+/// Verdict on a robot or on a trajectory.
+pub fn verdict(a: &Assessment) -> Verdict {
+    let b = a.base.count();
+    let Some(e) = &a.excitation else {
+        return Verdict {
+            grade: Grade::RobotAlone,
+            text: format!(
+                "The torques of this robot depend on {} of its {}: no trajectory can tell more, \
+                 and none was given, so nothing is said here about limits or uncertainty.",
+                count(b, "combination"),
+                count(a.base.names.len(), "standard parameter"),
+            ),
+        };
+    };
+    let broken = violations(&a.robot, e);
+    if !e.certificate.satisfied || !broken.is_empty() {
+        let more = match broken.len().saturating_sub(1) {
+            0 => String::new(),
+            1 => "; another limit does not hold either".into(),
+            n => format!("; {n} more limits do not hold either"),
+        };
+        let first = broken
+            .first()
+            .cloned()
+            .unwrap_or_else(|| "the limits could not be proven".into());
+        return Verdict {
+            grade: Grade::Unsafe,
+            text: format!("Do not run: {first}{more}."),
+        };
+    }
+    let limits = match &e.certificate.worst {
+        Some(w) => format!(
+            "all limits hold for all time (closest: {} {} at {})",
+            w.joint,
+            w.kind.name(),
+            percent(w.used)
+        ),
+        None => "the robot states no limits".into(),
+    };
+    let (known, judged) = parameters::known(&e.predictions);
+    let lost = e
+        .predictions
+        .iter()
+        .filter(|p| p.std.is_nan() || p.std >= 1e299)
+        .count();
+    let condition = e.condition.invariant;
+    if condition.is_nan() || condition > UNEXCITED || lost > 0 {
+        return Verdict {
+            grade: Grade::Unexciting,
+            text: format!(
+                "Safe to run, but not every parameter is excited: {limits}, yet the motion does \
+                 not tell all {} apart (condition number {}).",
+                count(b, "base parameter"),
+                significant(e.condition.invariant, 2)
+            ),
+        };
+    }
+    let noise = if a.robot.joints.iter().all(|j| j.torque_noise.is_some()) {
+        "stated"
+    } else {
+        "assumed"
+    };
+    let of = if judged == b {
+        format!("{known} of {judged}")
+    } else {
+        format!("{known} of the {judged} with a nominal value other than 0")
+    };
+    let facts = format!(
+        "{limits}, {}, condition number {}; {of} will be known to {KNOWN}\u{a0}% or better at the \
+         {noise} torque noise",
+        count(b, "base parameter"),
+        significant(e.condition.invariant, 3),
+    );
+    if 2 * known >= judged {
+        Verdict {
+            grade: Grade::Worthwhile,
+            text: format!("Safe to run and worth running: {facts}."),
+        }
+    } else {
+        Verdict {
+            grade: Grade::Weak,
+            text: format!("Safe to run, but it tells little: {facts}."),
+        }
+    }
+}
+
+/// Every limit that does not hold or is not proven to, in words, the furthest beyond first.
+pub(super) fn violations(robot: &Robot, e: &Excitation) -> Vec<String> {
+    let mut all: Vec<(f64, String)> = Vec::new();
+    for (joint, c) in robot.joints.iter().zip(&e.certificate.joints) {
+        position(joint.motion, c, &mut all);
+        for (kind, peak) in [
+            (Kind::Velocity, c.velocity),
+            (Kind::Acceleration, c.acceleration),
+            (Kind::Jerk, c.jerk),
+        ] {
+            if !peak.satisfied() {
+                all.push(magnitude(&c.joint, kind, joint.motion, &peak));
+            }
+        }
+        if let Some(t) = c.torque.as_ref().filter(|t| !t.satisfied()) {
+            let peak = Peak {
+                value: t.max_on_grid + t.coulomb,
+                time: t.time,
+                bound: t.bound(),
+                limit: t.limit,
+                used: t.used,
+                margin: t.margin,
+            };
+            all.push(magnitude(&c.joint, Kind::Torque, joint.motion, &peak));
+        }
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all.into_iter().map(|(_, text)| text).collect()
+}
+
+/// A magnitude beyond its limit, and which part of the limit it takes.
+fn magnitude(joint: &str, kind: Kind, motion: Motion, peak: &Peak) -> (f64, String) {
+    let unit = unit_of(kind, motion);
+    let what = format!("{joint} {}", kind.name());
+    let Some(limit) = peak.limit else {
+        return (f64::INFINITY, format!("{what} is not finite"));
+    };
+    let at = format!("at t = {}", with_unit(peak.time, 4, "s"));
+    let text = if peak.value > limit {
+        format!(
+            "{what} reaches {} {at}, {} over its limit of {}",
+            with_unit(peak.value, 4, unit),
+            percent(peak.value / limit - 1.0),
+            with_unit(limit, 4, unit)
+        )
+    } else {
+        format!(
+            "{what} comes so close to its limit of {} {at} that it is not proven to hold between \
+             samples (at most {})",
+            with_unit(limit, 4, unit),
+            with_unit(peak.bound, 4, unit)
+        )
+    };
+    (peak.used.unwrap_or(f64::INFINITY), text)
+}
+
+/// A position beyond one or both of its limits.
+fn position(motion: Motion, c: &JointCertificate, all: &mut Vec<(f64, String)>) {
+    let r = &c.position;
+    if r.satisfied() {
+        return;
+    }
+    let unit = unit_of(Kind::Position, motion);
+    let before = all.len();
+    for (extremum, limit, side, sign) in [
+        (r.min, r.lower, "lower", -1.0),
+        (r.max, r.upper, "upper", 1.0),
+    ] {
+        if let Some(limit) = limit
+            && sign * (extremum.value - limit) > 0.0
+        {
+            let over = sign * (extremum.value - limit);
+            let text = format!(
+                "{} position reaches {} at t = {}, {} beyond its {side} limit of {}",
+                c.joint,
+                with_unit(extremum.value, 4, unit),
+                with_unit(extremum.time, 4, "s"),
+                with_unit(over, 3, unit),
+                with_unit(limit, 4, unit)
+            );
+            all.push((r.used.unwrap_or(1.0), text));
+        }
+    }
+    if all.len() == before {
+        all.push((
+            r.used.unwrap_or(1.0),
+            format!(
+                "{} position is not proven to stay within its limits",
+                c.joint
+            ),
+        ));
+    }
+}
