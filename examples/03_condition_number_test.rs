@@ -9,7 +9,10 @@ use excite::{Error, Robot};
 
 fn assess() -> Result<Excitation, Error> {
     let robot = Robot::load("panda")?;
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/trajectories/panda/trajectory.json");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/trajectories/panda/trajectory.json"
+    );
     let trajectory = Trajectory::read(path)?;
     Assessment::new(&robot, &trajectory)?
         .excitation

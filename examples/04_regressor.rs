@@ -22,6 +22,8 @@ fn main() -> Result<(), Error> {
             (y_phi - tau[row]).abs()
         })
         .fold(0.0, f64::max);
-    println!("{rows} rows, {columns} columns: Y phi and recursive Newton-Euler differ by {worst:.1e} N m");
+    println!(
+        "{rows} rows, {columns} columns: Y phi and recursive Newton-Euler differ by {worst:.1e} N m"
+    );
     Ok(())
 }

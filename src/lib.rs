@@ -1,5 +1,52 @@
-//! Exciting trajectories for robots: designed, proven inside the limits before the run.
-// (crate documentation is completed as the pieces land)
+//! Exciting trajectories for robots: designed, and proven inside the limits, before the run.
+//!
+//! The joint torques of a robot are linear in its dynamic parameters, `τ = Y(q, q̇, q̈) φ`. How well
+//! a run can identify them is decided by the motion, before the robot moves. With `W` the stacked
+//! regressor of the motion, this crate solves
+//!
+//! ```text
+//! minimise over x    cond W(x)                     (or ln det, trace, smallest eigenvalue)
+//! subject to         q_min ≤ q(t; x) ≤ q_max
+//!                    |q̇| ≤ v,  |q̈| ≤ a,  |q⃛| ≤ j      for all t, not only at samples
+//!                    |τ(q, q̇, q̈)| ≤ τ_max
+//! ```
+//!
+//! where `q(t; x)` is a Fourier series for each joint, and says before the run which parameters it
+//! will identify and how well.
+//!
+//! ```
+//! use excite::design::{Settings, design};
+//! use excite::identifiability::Assessment;
+//! use std::sync::atomic::AtomicBool;
+//!
+//! let robot = excite::Robot::load("planar2")?; // a bundled name, a robot.toml or a URDF
+//! let settings = Settings { starts: Some(2), ..Settings::default() };
+//! let result = design(&robot, &settings, &AtomicBool::new(false), &|_| {})?;
+//! let report = Assessment::new(&result.robot, &result.trajectory)?;
+//! let excitation = report.excitation.expect("a trajectory was given");
+//! assert!(excitation.certificate.satisfied && excitation.condition.invariant < 3.0);
+//! # Ok::<(), excite::Error>(())
+//! ```
+//!
+//! | stage | module | what it gives |
+//! |---|---|---|
+//! | robot | [`robot`] | bodies, joints, limits, the ten inertial parameters |
+//! | dynamics | [`dynamics`], [`regressor`] | `τ`, `Y`, `W` and exact derivatives, in batches |
+//! | base | [`base`] | base parameters, rank, what cannot be identified and why |
+//! | trajectory | [`trajectory`] | Fourier series, exact extrema, certificates, files |
+//! | design | [`design`] | the optimiser |
+//! | report | [`identifiability`], [`report`] | what the run will tell, as JSON and HTML |
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | `q, qd, qdd` | positions, velocities, accelerations (rad or m, s) |
+//! | `tau` | joint torques or forces (N m or N) |
+//! | `phi` | standard parameters: ten a link, then the joint terms |
+//! | `Y`, `W` | regressor of one sample, stacked regressor |
+//! | `pi_b` | base parameters |
+//!
+//! SI units everywhere. All conventions are in `docs/notation.md`, the method with its equations in
+//! `docs/method.md`.
 #![warn(missing_docs)]
 
 pub mod base;

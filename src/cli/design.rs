@@ -37,13 +37,13 @@ pub struct Args {
     #[arg(long)]
     force: bool,
     /// Harmonics of the Fourier series of each joint
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, default_value_t = 5, allow_negative_numbers = true)]
     harmonics: usize,
     /// Period in seconds
     #[arg(long, default_value_t = 10.0, allow_negative_numbers = true)]
     period: f64,
     /// Periods of the experiment
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     periods: u32,
     /// Harmonics used: full (1, 2, 3, …), odd, or random-odd (odd with one in four left out)
     #[arg(long, default_value = "full")]
@@ -52,7 +52,12 @@ pub struct Args {
     #[arg(long, default_value = "rest")]
     ends: Ends,
     /// Posture at the start, rad or m, one number per joint [default: free]
-    #[arg(long, value_name = "Q1,Q2,…", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "Q1,Q2,…",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
     start: Option<Vec<f64>>,
     /// Criterion: condition, d, a or e
     #[arg(long, default_value = "condition", value_parser = named::<Criterion>)]
@@ -67,16 +72,16 @@ pub struct Args {
     #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
     rate: f64,
     /// Seed of the random starts
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
-    /// Most starts [default: 16, or no limit where a time limit is given]
-    #[arg(long)]
+    /// Most starts [default: 8, or no limit where a time limit is given]
+    #[arg(long, allow_negative_numbers = true)]
     starts: Option<usize>,
     /// Wall clock of the optimisation in seconds [default: 60, or none where starts are given]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
     /// Threads, 0 for one per core
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     threads: usize,
     /// Joint columns beside the ten of each link, for all joints: armature, viscous, coulomb,
     /// offset, or none [default: as in the robot file]
@@ -118,7 +123,12 @@ pub fn run(args: Args) -> Result<()> {
             args.rate
         )));
     }
-    let names = ["trajectory.json", "samples.csv", "report.json", "report.html"];
+    let names = [
+        "trajectory.json",
+        "samples.csv",
+        "report.json",
+        "report.html",
+    ];
     let files = prepare_dir(&args.output, &names, args.force)?;
 
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -150,10 +160,25 @@ pub fn run(args: Args) -> Result<()> {
     let tree = Tree::new(&result.robot);
     let torque = excite::regressor::torque_function(&result.robot, &tree);
     let fourier = &result.trajectory.fourier;
-    write_samples(&files[1], args.force, fourier, settings.periods, args.rate, Some(&torque))?;
-    let json = before::json(&assessment, Some(&result.record), begin.elapsed().as_secs_f64());
+    write_samples(
+        &files[1],
+        args.force,
+        fourier,
+        settings.periods,
+        args.rate,
+        Some(&torque),
+    )?;
+    let json = before::json(
+        &assessment,
+        Some(&result.record),
+        begin.elapsed().as_secs_f64(),
+    );
     write(&files[2], args.force, &pretty(&json))?;
-    write(&files[3], args.force, &before::html(&assessment, Some(&result.record)))?;
+    write(
+        &files[3],
+        args.force,
+        &before::html(&assessment, Some(&result.record)),
+    )?;
     match args.json {
         true => print(&pretty(&json)),
         false => print(&summary(&assessment, Some(&result.record), &files)),

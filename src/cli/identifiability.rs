@@ -1,11 +1,11 @@
 //! `excite identifiability ROBOT [TRAJECTORY]`.
 
 use super::{load, pretty, print, summary::summary, warn, write};
-use excite::Result;
 use excite::identifiability::Assessment;
 use excite::output::prepare_dir;
 use excite::report::before;
 use excite::trajectory::Trajectory;
+use excite::{Error, Result};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -44,6 +44,10 @@ pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let robot = load(&args.robot, args.identify.as_deref())?;
     let trajectory = args.trajectory.as_ref().map(Trajectory::read).transpose()?;
+    if let (Some(t), Some(path)) = (&trajectory, &args.trajectory) {
+        t.matches(&robot)
+            .map_err(|e| Error::file(path, "", e.to_string()))?;
+    }
     let files = prepare_dir(&args.output, &["report.json", "report.html"], args.force)?;
     let assessment = match &trajectory {
         Some(t) => Assessment::new(&robot, t)?,

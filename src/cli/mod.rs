@@ -17,7 +17,12 @@ use std::process::ExitCode;
 
 /// Exciting trajectories for robots: designed, and proven inside the limits, before the run.
 #[derive(Parser)]
-#[command(name = "excite", version, max_term_width = 90, arg_required_else_help = true)]
+#[command(
+    name = "excite",
+    version,
+    max_term_width = 90,
+    arg_required_else_help = true
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -72,14 +77,19 @@ fn warn(warnings: &[Warning]) {
         eprintln!("warning: {w}");
     }
     if warnings.len() > MOST {
-        eprintln!("warning: and {} more, all of them in the report", warnings.len() - MOST);
+        eprintln!(
+            "warning: and {} more, all of them in the report",
+            warnings.len() - MOST
+        );
     }
 }
 
 /// A robot, with other joint columns where the command line asks for them.
 fn load(spec: &str, identify: Option<&[String]>) -> Result<Robot> {
     let robot = Robot::load(spec)?;
-    let Some(names) = identify else { return Ok(robot) };
+    let Some(names) = identify else {
+        return Ok(robot);
+    };
     let mut terms = Vec::new();
     for name in names.iter().filter(|n| n.as_str() != "none") {
         match JointTerm::ALL.into_iter().find(|t| t.name() == name) {

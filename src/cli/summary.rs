@@ -10,8 +10,11 @@ use std::path::PathBuf;
 pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBuf]) -> String {
     let mut out = String::new();
     let base = &assessment.base;
-    let felt =
-        base.standard.iter().filter(|s| s.identifiability != Identifiability::None).count();
+    let felt = base
+        .standard
+        .iter()
+        .filter(|s| s.identifiability != Identifiability::None)
+        .count();
     let _ = writeln!(
         out,
         "{}: {} joints; {felt} of {} parameters are felt, in {} base parameters",
@@ -29,7 +32,12 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
             Status::TimeLimit => "ended by the time limit",
             Status::Interrupted => "interrupted; this is the best so far",
         };
-        let _ = writeln!(out, "design: {} starts in {:.1} s, {how}", r.starts.len(), r.seconds);
+        let _ = writeln!(
+            out,
+            "design: {} starts in {:.1} s, {how}",
+            r.starts.len(),
+            r.seconds
+        );
     }
     for f in files {
         let _ = writeln!(out, "wrote {}", f.display());
@@ -60,14 +68,18 @@ fn excitation(e: &Excitation) -> String {
         None => writeln!(out, "limits: none stated"),
     };
     if let Some(p) = e.predictions.first() {
-        let good = e.predictions.iter().filter(|p| p.percent.is_some_and(|x| x <= 10.0)).count();
+        let good = e
+            .predictions
+            .iter()
+            .filter(|p| p.percent.is_some_and(|x| x <= 10.0))
+            .count();
         let worst = match p.percent {
             Some(x) => format!("{x:.1} %"),
             None => format!("{:.2e} {} about 0", p.std, p.unit),
         };
         let _ = writeln!(
             out,
-            "predicted: {good} of {} base parameters to 10 % or better; worst {}: {worst}",
+            "predicted: {good} of {} base parameters to 10 % or better\n           worst {}: {worst}",
             e.predictions.len(),
             p.parameter
         );

@@ -35,11 +35,15 @@ pub fn run(args: Args) -> Result<()> {
     };
     let tau = nominal_torque(&robot, &Tree::new(&robot), &motion);
     let mut text = String::from("t");
-    (1..=robot.dof()).for_each(|j| drop(write!(text, ",tau{j}")));
+    for j in 1..=robot.dof() {
+        let _ = write!(text, ",tau{j}");
+    }
     text.push('\n');
     for i in 0..motion.count {
         let _ = write!(text, "{}", samples.t[i]);
-        (0..robot.dof()).for_each(|j| drop(write!(text, ",{}", tau[j * motion.count + i])));
+        for j in 0..robot.dof() {
+            let _ = write!(text, ",{}", tau[j * motion.count + i]);
+        }
         text.push('\n');
         if text.len() > 1 << 20 {
             super::print(&text)?;

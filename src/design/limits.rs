@@ -158,7 +158,13 @@ impl Limits {
                 for row in &self.grid[b.order as usize] {
                     self.push(j, b, row, x_j, near, &mut rows);
                 }
-                extrema_fast(&self.table, &series, b.order, &mut work.samples, &mut work.found);
+                extrema_fast(
+                    &self.table,
+                    &series,
+                    b.order,
+                    &mut work.samples,
+                    &mut work.found,
+                );
                 for e in &work.found {
                     self.push(j, b, &self.row(b.order, e.time), x_j, near, &mut rows);
                 }
@@ -169,15 +175,27 @@ impl Limits {
 
     /// Adds the row of one instant where it is near a limit.
     fn push(&self, j: usize, b: &Band, row: &[f64], x_j: &[f64], near: f64, rows: &mut Vec<Row>) {
-        let constant = if b.order == 0 { self.basis.offset[j][0] } else { 0.0 };
+        let constant = if b.order == 0 {
+            self.basis.offset[j][0]
+        } else {
+            0.0
+        };
         let value = constant + row.iter().zip(x_j).map(|(r, x)| r * x).sum::<f64>();
         let rest = if b.order == 0 { self.rest(j) } else { 0.0 };
         if value - rest > near * (b.high - rest) {
-            rows.push(Row { joint: j, row: row.to_vec(), slack: (b.high - value).max(0.0) });
+            rows.push(Row {
+                joint: j,
+                row: row.to_vec(),
+                slack: (b.high - value).max(0.0),
+            });
         }
         if rest - value > near * (rest - b.low) {
             let row = row.iter().map(|r| -r).collect();
-            rows.push(Row { joint: j, row, slack: (value - b.low).max(0.0) });
+            rows.push(Row {
+                joint: j,
+                row,
+                slack: (value - b.low).max(0.0),
+            });
         }
     }
 
@@ -190,12 +208,25 @@ impl Limits {
             let series = self.series(j, &next[j * m..(j + 1) * m]);
             for b in bands {
                 let rest = if b.order == 0 { self.rest(j) } else { 0.0 };
-                extrema_fast(&self.table, &series, b.order, &mut work.samples, &mut work.found);
+                extrema_fast(
+                    &self.table,
+                    &series,
+                    b.order,
+                    &mut work.samples,
+                    &mut work.found,
+                );
                 for e in &work.found {
                     let over = (e.value - rest) / (b.high - rest);
                     let under = (rest - e.value) / (rest - b.low);
                     if over > 1.001 || under > 1.001 {
-                        self.push(j, b, &self.row(b.order, e.time), x_j, f64::NEG_INFINITY, rows);
+                        self.push(
+                            j,
+                            b,
+                            &self.row(b.order, e.time),
+                            x_j,
+                            f64::NEG_INFINITY,
+                            rows,
+                        );
                     }
                 }
             }

@@ -92,7 +92,10 @@ pub fn with_assumed_limits(robot: &Robot) -> Robot {
                 (_, true) => [high - 2.0 * reach, high],
                 _ => [-reach, reach],
             };
-            assumed.push(format!("position {:.4} to {:.4} {unit}", l.position[0], l.position[1]));
+            assumed.push(format!(
+                "position {:.4} to {:.4} {unit}",
+                l.position[0], l.position[1]
+            ));
         }
         if !l.velocity.is_finite() {
             l.velocity = speed;
@@ -105,7 +108,10 @@ pub fn with_assumed_limits(robot: &Robot) -> Robot {
         if !assumed.is_empty() {
             robot.warnings.push(Warning::new(
                 joint.name.clone(),
-                format!("limits not stated, assumed for the design: {}", assumed.join(", ")),
+                format!(
+                    "limits not stated, assumed for the design: {}",
+                    assumed.join(", ")
+                ),
             ));
         }
         if !joint.limits.effort.is_finite() {
@@ -147,7 +153,12 @@ pub fn design(
         )));
     }
     let harmonics = settings.grid.harmonics(settings.harmonics, settings.seed);
-    let basis = Basis::new(&harmonics, settings.ends, robot.dof(), settings.start.as_deref())?;
+    let basis = Basis::new(
+        &harmonics,
+        settings.ends,
+        robot.dof(),
+        settings.start.as_deref(),
+    )?;
     let count = samples(&robot, &harmonics);
     let transform = match settings.condition {
         Condition::Invariant => base.row_space.clone(),
@@ -159,7 +170,10 @@ pub fn design(
     let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
     let torque = TorqueLimits::new(&robot, settings.derate);
     let scale = start::scales(&robot, settings.period);
-    let objective = Objective { criterion: settings.criterion, condition: settings.condition };
+    let objective = Objective {
+        criterion: settings.criterion,
+        condition: settings.condition,
+    };
     let task = Task {
         info: &info,
         objective,
@@ -174,7 +188,12 @@ pub fn design(
         .num_threads(settings.threads)
         .build()
         .map_err(|e| Error::Argument(format!("threads: {e}")))?;
-    let source = start::Source { robot: &robot, basis: &basis, task: &task, seed: settings.seed };
+    let source = start::Source {
+        robot: &robot,
+        basis: &basis,
+        task: &task,
+        seed: settings.seed,
+    };
     let mut search = Search::default();
     pool.install(|| -> Result<()> {
         while search.next < starts && (search.best.is_none() || !halt()) {
@@ -195,7 +214,12 @@ pub fn design(
         _ => Status::Converged,
     };
     let Some((best, iterate)) = search.best else {
-        return Err(Error::Infeasible(infeasible(&robot, torque.as_ref(), &info, &limits)));
+        return Err(Error::Infeasible(infeasible(
+            &robot,
+            torque.as_ref(),
+            &info,
+            &limits,
+        )));
     };
     let fourier = settle(&robot, settings, &basis, &limits, iterate.x)?;
     let trajectory = Trajectory {
@@ -212,14 +236,22 @@ pub fn design(
         best,
         seconds: begin.elapsed().as_secs_f64(),
     };
-    Ok(Design { robot, trajectory, value: iterate.value.exp(), record })
+    Ok(Design {
+        robot,
+        trajectory,
+        value: iterate.value.exp(),
+        record,
+    })
 }
 
 /// Samples of a period in the optimiser: enough for the harmonics that trigonometric functions of
 /// the positions add, more where the sign of the velocity is a column.
 fn samples(robot: &Robot, harmonics: &[u32]) -> usize {
     let most = harmonics.iter().copied().max().unwrap_or(1) as usize;
-    let coulomb = robot.joints.iter().any(|j| j.identify[JointTerm::Coulomb as usize]);
+    let coulomb = robot
+        .joints
+        .iter()
+        .any(|j| j.identify[JointTerm::Coulomb as usize]);
     (most * if coulomb { 36 } else { 20 }).clamp(64, 8000)
 }
 
@@ -248,6 +280,9 @@ impl Search {
         let begun: Vec<Option<(usize, Iterate, bool)>> = (first..first + size)
             .into_par_iter()
             .map(|number| {
+                if (incumbent.is_some() || number > first) && halt() {
+                    return Ok(None);
+                }
                 // every other start of the later rounds disturbs the best so far
                 let x = match incumbent {
                     Some(b) if number % 2 == 1 => Some(source.disturbed(&b.x, number)),
@@ -255,24 +290,40 @@ impl Search {
                 };
                 let Some(x) = x else { return Ok(None) };
                 let mut it = Iterate::new(task, x);
-                let stop = Stop { iterations: 120, gain: 1e-2 };
+                let stop = Stop {
+                    iterations: 120,
+                    gain: 1e-2,
+                };
                 it.run(task, Phase::Smooth(NORMS.0), stop, halt)?;
                 Ok(Some((number, it, false)))
             })
             .collect::<Result<_>>()?;
         let mut begun: Vec<_> = begun.into_iter().flatten().collect();
         begun.sort_by(|a, b| a.1.value.total_cmp(&b.1.value).then(a.0.cmp(&b.0)));
-        begun.par_iter_mut().take(ROUND.1).try_for_each(|(_, it, done)| -> Result<()> {
-            let stop = Stop { iterations: 150, gain: 2e-3 };
-            it.run(task, Phase::Smooth(NORMS.1), stop, halt)?;
-            let stop = Stop { iterations: 60, gain: 5e-4 };
-            *done = it.run(task, Phase::Exact, stop, halt)?;
-            Ok(())
-        })?;
+        begun
+            .par_iter_mut()
+            .take(ROUND.1)
+            .try_for_each(|(_, it, done)| -> Result<()> {
+                let stop = Stop {
+                    iterations: 150,
+                    gain: 2e-3,
+                };
+                it.run(task, Phase::Smooth(NORMS.1), stop, halt)?;
+                let stop = Stop {
+                    iterations: 60,
+                    gain: 5e-4,
+                };
+                *done = it.run(task, Phase::Exact, stop, halt)?;
+                Ok(())
+            })?;
         begun.sort_by_key(|b| b.0);
         for (number, it, converged) in begun {
             let history = it.history.iter().map(|v| v.exp().min(1e300)).collect();
-            self.starts.push(record::Start { number, history, converged });
+            self.starts.push(record::Start {
+                number,
+                history,
+                converged,
+            });
             if self.best.as_ref().is_none_or(|(_, b)| it.value < b.value) {
                 self.best = Some((number, it));
             }
@@ -307,7 +358,9 @@ fn settle(
         for j in 0..robot.dof() {
             let rest = limits.rest_parameters(j);
             let x_j = &mut x[j * m..(j + 1) * m];
-            x_j.iter_mut().zip(rest).for_each(|(x, r)| *x = r + 0.998 * (*x - r));
+            x_j.iter_mut()
+                .zip(rest)
+                .for_each(|(x, r)| *x = r + 0.998 * (*x - r));
         }
     }
     Ok(basis.fourier(settings.period, &x))
@@ -320,7 +373,9 @@ fn infeasible(
     info: &Information,
     limits: &Limits,
 ) -> String {
-    let rest: Vec<f64> = (0..robot.dof()).flat_map(|j| limits.rest_parameters(j)).collect();
+    let rest: Vec<f64> = (0..robot.dof())
+        .flat_map(|j| limits.rest_parameters(j))
+        .collect();
     if let Some(t) = torque {
         let mut motion = Default::default();
         let mut tau = Vec::new();
@@ -339,5 +394,8 @@ fn infeasible(
             );
         }
     }
-    format!("{}: no feasible trajectory was found; check the limits and the start posture", robot.name)
+    format!(
+        "{}: no feasible trajectory was found; check the limits and the start posture",
+        robot.name
+    )
 }

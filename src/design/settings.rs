@@ -20,6 +20,7 @@ pub struct Settings {
     /// `rest`: zero velocity and acceleration at both ends; `free`
     pub ends: Ends,
     /// posture at the start, rad or m per joint, where it is prescribed
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub start: Option<Vec<f64>>,
     /// what is minimised
     pub criterion: Criterion,
@@ -29,9 +30,11 @@ pub struct Settings {
     pub derate: f64,
     /// seed of the random starts
     pub seed: u64,
-    /// most starts; where neither this nor a time limit is given, 16 within 60 s
+    /// most starts; where neither this nor a time limit is given, 8 within 60 s
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub starts: Option<usize>,
     /// wall clock of the optimisation, s; given alone, starts go on until it ends
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub time_limit: Option<f64>,
     /// threads; 0 for one per core
     pub threads: usize,
@@ -61,7 +64,7 @@ impl Settings {
     /// Most starts and seconds, with the defaults filled in.
     pub fn budget(&self) -> (usize, f64) {
         match (self.starts, self.time_limit) {
-            (None, None) => (16, 60.0),
+            (None, None) => (8, 60.0),
             (Some(starts), None) => (starts, f64::INFINITY),
             (None, Some(seconds)) => (usize::MAX, seconds),
             (Some(starts), Some(seconds)) => (starts, seconds),
@@ -104,9 +107,11 @@ impl Settings {
             return bad("starts must be between 1 and 1000000".into());
         }
         if let Some(t) = self.time_limit
-            && (t.is_nan() || t <= 0.0)
+            && !(t > 0.0 && t <= 1e7)
         {
-            return bad(format!("time limit must be more than 0 s, not {t}"));
+            return bad(format!(
+                "time limit must be more than 0 and at most 1e7 s, not {t}"
+            ));
         }
         if self.threads > 1024 {
             return bad(format!(

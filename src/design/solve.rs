@@ -91,8 +91,16 @@ const ROUNDS: usize = 3;
 impl Iterate {
     /// At a feasible `x`.
     pub fn new(task: &Task, x: Vec<f64>) -> Self {
-        let value = task.objective.evaluate(task.info, &x, &mut Evaluation::default());
-        Iterate { x, value, history: vec![value], hessian: None, damping: DAMPING.0 }
+        let value = task
+            .objective
+            .evaluate(task.info, &x, &mut Evaluation::default());
+        Iterate {
+            x,
+            value,
+            history: vec![value],
+            hessian: None,
+            damping: DAMPING.0,
+        }
     }
 
     /// Runs one phase until it converges (then returns true), or until `halt` says so.
@@ -118,7 +126,9 @@ impl Iterate {
             if halt() {
                 return Ok(false);
             }
-            let matrix = (phase != Phase::Exact).then_some(self.hessian.as_ref()).flatten();
+            let matrix = (phase != Phase::Exact)
+                .then_some(self.hessian.as_ref())
+                .flatten();
             let Some(step) = state.step(task, &here, matrix, self.damping, &self.x)? else {
                 self.damping *= 10.0;
                 if self.damping > DAMPING.1 {
@@ -130,7 +140,9 @@ impl Iterate {
                 true => Some(state.visit(task, phase, &step.x)?),
                 false => None,
             };
-            let decrease = there.as_ref().map_or(f64::NEG_INFINITY, |t| here.merit - t.merit);
+            let decrease = there
+                .as_ref()
+                .map_or(f64::NEG_INFINITY, |t| here.merit - t.merit);
             let ratio = decrease / step.predicted.max(1e-300);
             if ratio < 0.1 {
                 self.damping = (self.damping * 4.0).max(1e-3);
@@ -141,8 +153,13 @@ impl Iterate {
                 && there.merit.is_finite()
             {
                 let z = task.scaled(&step.x, &self.x);
-                let y: Vec<f64> =
-                    there.model.gradient.iter().zip(&here.model.gradient).map(|(a, b)| a - b).collect();
+                let y: Vec<f64> = there
+                    .model
+                    .gradient
+                    .iter()
+                    .zip(&here.model.gradient)
+                    .map(|(a, b)| a - b)
+                    .collect();
                 bfgs(&mut self.hessian, &z, &y);
             }
             if let Some(there) = there
@@ -175,7 +192,11 @@ impl Task<'_> {
     /// `(a − b) / s`, component by component.
     fn scaled(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
         let m = self.free();
-        a.iter().zip(b).enumerate().map(|(k, (a, b))| (a - b) / self.scale[k / m]).collect()
+        a.iter()
+            .zip(b)
+            .enumerate()
+            .map(|(k, (a, b))| (a - b) / self.scale[k / m])
+            .collect()
     }
 }
 
@@ -225,13 +246,23 @@ impl State {
             Phase::Smooth(p) => {
                 let merit = task.objective.smooth_value(&spectrum, p);
                 let gradient = task.objective.smooth_gradient(task.info, e, &spectrum, p);
-                (merit, Model { value: merit, gradient, upper: None, lower: None })
+                (
+                    merit,
+                    Model {
+                        value: merit,
+                        gradient,
+                        upper: None,
+                        lower: None,
+                    },
+                )
             }
             Phase::Exact => (value, task.objective.model(task.info, e, &spectrum)),
         };
         let m = task.free();
         let scale = |g: &mut Vec<f64>| {
-            g.iter_mut().enumerate().for_each(|(k, g)| *g *= task.scale[k / m]);
+            g.iter_mut()
+                .enumerate()
+                .for_each(|(k, g)| *g *= task.scale[k / m]);
         };
         scale(&mut model.gradient);
         for c in [&mut model.upper, &mut model.lower].into_iter().flatten() {
@@ -241,7 +272,12 @@ impl State {
             Some(limits) => limits.rows(task.info, e, 0.8),
             None => Vec::new(),
         };
-        Ok(Point { merit, value, model, torque_rows })
+        Ok(Point {
+            merit,
+            value,
+            model,
+            torque_rows,
+        })
     }
 
     /// Solves the subproblem at a point: the new trajectory, inside all joint limits, and the
@@ -267,8 +303,9 @@ impl State {
             if !solution.status.is_solved() {
                 return Ok(None);
             }
-            let mut next: Vec<f64> =
-                (0..n).map(|k| x[k] + solution.x[k] * task.scale[k / m]).collect();
+            let mut next: Vec<f64> = (0..n)
+                .map(|k| x[k] + solution.x[k] * task.scale[k / m])
+                .collect();
             if round < ROUNDS {
                 let before = rows.len();
                 task.limits.cut(x, &next, &mut rows, &mut self.work);
@@ -277,10 +314,15 @@ impl State {
                 }
             }
             task.limits.pull_inside(&mut next, &mut self.work);
-            let free = f64::from(here.model.lower.is_some()) - f64::from(here.model.upper.is_some());
+            let free =
+                f64::from(here.model.lower.is_some()) - f64::from(here.model.upper.is_some());
             let predicted = -(solution.objective + 0.5 * free);
             let fits = self.fit_torques(task, x, &mut next);
-            return Ok(Some(Step { x: next, predicted, fits }));
+            return Ok(Some(Step {
+                x: next,
+                predicted,
+                fits,
+            }));
         }
         Ok(None)
     }
@@ -308,7 +350,10 @@ impl State {
             }
         }
         // a 1 − U ⪰ 0 with ½a minimised, L − b 1 ⪰ 0 with ½b maximised
-        for (slot, cluster, sign) in [(n, &here.model.upper, -1.0), (n + 1, &here.model.lower, 1.0)] {
+        for (slot, cluster, sign) in [
+            (n, &here.model.upper, -1.0),
+            (n + 1, &here.model.lower, 1.0),
+        ] {
             match cluster {
                 Some(c) => matrix_inequality(p, c, n, slot, sign),
                 None => {
@@ -318,20 +363,29 @@ impl State {
         }
         for row in rows {
             let s = task.scale[row.joint];
-            let entries = row.row.iter().enumerate().map(|(k, r)| (row.joint * m + k, r * s));
+            let entries = row
+                .row
+                .iter()
+                .enumerate()
+                .map(|(k, r)| (row.joint * m + k, r * s));
             p.inequality(entries, row.slack);
         }
         for row in &here.torque_rows {
             let sign = row.value.signum();
-            let entries =
-                row.gradient.iter().enumerate().map(|(k, g)| (k, sign * g * task.scale[k / m]));
+            let entries = row
+                .gradient
+                .iter()
+                .enumerate()
+                .map(|(k, g)| (k, sign * g * task.scale[k / m]));
             p.inequality(entries, 0.997 * row.limit - row.value.abs());
         }
     }
 
     /// Goes back along the step until the true torques fit; false if they do not.
     fn fit_torques(&mut self, task: &Task, x: &[f64], next: &mut [f64]) -> bool {
-        let Some(limits) = task.torque else { return true };
+        let Some(limits) = task.torque else {
+            return true;
+        };
         for _ in 0..10 {
             let motion = &mut self.evaluation.motion;
             task.info.sample(next, motion);
@@ -339,7 +393,9 @@ impl State {
             if limits.worst(&self.tau).0 <= 1.0 {
                 return true;
             }
-            next.iter_mut().zip(x).for_each(|(n, x)| *n = x + 0.6 * (*n - x));
+            next.iter_mut()
+                .zip(x)
+                .for_each(|(n, x)| *n = x + 0.6 * (*n - x));
         }
         false
     }
@@ -349,15 +405,26 @@ impl State {
 /// in the objective.
 fn matrix_inequality(problem: &mut Problem, cluster: &Cluster, n: usize, slot: usize, sign: f64) {
     let s = cluster.values.len();
-    let a0 = Mat::from_fn(s, s, |i, j| if i == j { sign * cluster.values[i] } else { 0.0 });
+    let a0 = Mat::from_fn(s, s, |i, j| {
+        if i == j {
+            sign * cluster.values[i]
+        } else {
+            0.0
+        }
+    });
     let pair = |i: usize, j: usize| {
         let (i, j) = (i.min(j), i.max(j));
         &cluster.gradients[j * (j + 1) / 2 + i]
     };
-    let terms: Vec<Mat<f64>> =
-        (0..n).map(|k| Mat::from_fn(s, s, |i, j| sign * pair(i, j)[k])).collect();
+    let terms: Vec<Mat<f64>> = (0..n)
+        .map(|k| Mat::from_fn(s, s, |i, j| sign * pair(i, j)[k]))
+        .collect();
     let identity = Mat::from_fn(s, s, |i, j| if i == j { -sign } else { 0.0 });
-    let mut list: Vec<_> = terms.iter().enumerate().map(|(k, a)| (k, a.as_ref())).collect();
+    let mut list: Vec<_> = terms
+        .iter()
+        .enumerate()
+        .map(|(k, a)| (k, a.as_ref()))
+        .collect();
     list.push((slot, identity.as_ref()));
     problem.semidefinite(a0.as_ref(), &list);
     problem.linear(slot, -0.5 * sign);
@@ -373,14 +440,25 @@ fn bfgs(hessian: &mut Option<Mat<f64>>, z: &[f64], y: &[f64]) {
         return;
     }
     let b = hessian.get_or_insert_with(|| {
-        let size = if zy > 0.0 { (yy / zy).clamp(1e-3, 1e3) } else { (yy / zz).sqrt() };
+        let size = if zy > 0.0 {
+            (yy / zy).clamp(1e-3, 1e3)
+        } else {
+            (yy / zz).sqrt()
+        };
         Mat::from_fn(n, n, |i, j| if i == j { size } else { 0.0 })
     });
-    let bz: Vec<f64> =
-        (0..n).map(|i| (0..n).map(|j| b[(j, i)] * z[j]).sum()).collect();
+    let bz: Vec<f64> = (0..n)
+        .map(|i| (0..n).map(|j| b[(j, i)] * z[j]).sum())
+        .collect();
     let zbz = dot(z, &bz);
-    let theta = if zy >= 0.2 * zbz { 1.0 } else { 0.8 * zbz / (zbz - zy) };
-    let r: Vec<f64> = (0..n).map(|k| theta * y[k] + (1.0 - theta) * bz[k]).collect();
+    let theta = if zy >= 0.2 * zbz {
+        1.0
+    } else {
+        0.8 * zbz / (zbz - zy)
+    };
+    let r: Vec<f64> = (0..n)
+        .map(|k| theta * y[k] + (1.0 - theta) * bz[k])
+        .collect();
     let zr = dot(z, &r);
     if !(zr > 0.0 && zbz > 0.0) {
         return;

@@ -18,9 +18,17 @@ pub fn scales(robot: &Robot, period: f64) -> Vec<f64> {
         .iter()
         .map(|j| {
             let [low, high] = j.limits.position;
-            let free = if j.motion == Motion::Revolute { std::f64::consts::PI } else { 0.5 };
+            let free = if j.motion == Motion::Revolute {
+                std::f64::consts::PI
+            } else {
+                0.5
+            };
             let half = 0.5 * (high - low);
-            let half = if half.is_finite() { half.min(2.0 * free) } else { free };
+            let half = if half.is_finite() {
+                half.min(2.0 * free)
+            } else {
+                free
+            };
             half.min(j.limits.velocity / omega).max(1e-6)
         })
         .collect()
@@ -59,7 +67,9 @@ impl Source<'_> {
             if best.is_some() && halt() {
                 break;
             }
-            let Some(x) = self.candidate(&mut rng) else { continue };
+            let Some(x) = self.candidate(&mut rng) else {
+                continue;
+            };
             let value = self.task.objective.evaluate(self.task.info, &x, &mut e);
             if best.as_ref().is_none_or(|b| value < b.0) {
                 best = Some((value, x));
@@ -78,7 +88,9 @@ impl Source<'_> {
             .enumerate()
             .map(|(k, x)| x + size * self.task.scale[k / m] * rng.random_range(-1.0..1.0))
             .collect();
-        self.task.limits.pull_inside(&mut next, &mut ExtremaWork::default());
+        self.task
+            .limits
+            .pull_inside(&mut next, &mut ExtremaWork::default());
         self.fit_torques(&next, x).unwrap_or_else(|| x.to_vec())
     }
 
@@ -120,12 +132,17 @@ impl Source<'_> {
 
     /// The largest of a few steps from a feasible trajectory towards another whose torques fit.
     fn fit_torques(&self, x: &[f64], from: &[f64]) -> Option<Vec<f64>> {
-        let Some(limits) = self.task.torque else { return Some(x.to_vec()) };
+        let Some(limits) = self.task.torque else {
+            return Some(x.to_vec());
+        };
         let (mut motion, mut ws, mut tau) = (Samples::default(), Default::default(), Vec::new());
         let mut fraction = 1.0;
         for attempt in 0..30 {
-            let trial: Vec<f64> =
-                x.iter().zip(from).map(|(x, r)| r + fraction * (x - r)).collect();
+            let trial: Vec<f64> = x
+                .iter()
+                .zip(from)
+                .map(|(x, r)| r + fraction * (x - r))
+                .collect();
             self.task.info.sample(&trial, &mut motion);
             limits.torques(self.task.info, &motion, &mut ws, &mut tau);
             if limits.worst(&tau).0 <= 1.0 {

@@ -85,8 +85,16 @@ fn design(file: &str, s: &Settings) -> String {
     parts.push(format!("--condition {}", word(s.condition)));
     parts.push(format!("--derate {}", s.derate));
     parts.push(format!("--seed {}", s.seed));
-    parts.push(format!("--starts {}", s.starts));
-    parts.push(format!("--time-limit {}", s.time_limit));
+    if let Some(start) = &s.start {
+        let posture: Vec<String> = start.iter().map(f64::to_string).collect();
+        parts.push(format!("--start {}", posture.join(",")));
+    }
+    if let Some(starts) = s.starts {
+        parts.push(format!("--starts {starts}"));
+    }
+    if let Some(seconds) = s.time_limit {
+        parts.push(format!("--time-limit {seconds}"));
+    }
     parts.join(" \\\n  ")
 }
 

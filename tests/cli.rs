@@ -1,0 +1,383 @@
+//! The program as a user runs it: results, exit status, messages, and nothing lost.
+
+use assert_cmd::Command;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// One run in an empty directory of its own.
+struct Test {
+    dir: TempDir,
+}
+
+struct Outcome {
+    status: i32,
+    stdout: String,
+    stderr: String,
+}
+
+impl Test {
+    fn new() -> Self {
+        Test {
+            dir: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    fn file(self, name: &str, content: impl AsRef<[u8]>) -> Self {
+        std::fs::write(self.dir.path().join(name), content).unwrap();
+        self
+    }
+
+    fn path(&self) -> &Path {
+        self.dir.path()
+    }
+
+    fn run(&self, line: &str) -> Outcome {
+        let out = Command::cargo_bin("excite")
+            .unwrap()
+            .current_dir(self.path())
+            .args(line.split_whitespace())
+            .timeout(std::time::Duration::from_secs(120))
+            .output()
+            .unwrap();
+        Outcome {
+            status: out.status.code().unwrap_or(-1),
+            stdout: String::from_utf8_lossy(&out.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&out.stderr).into_owned(),
+        }
+    }
+
+    /// Runs a line that must fail with this status and one message that holds all the words.
+    fn fails(&self, line: &str, status: i32, words: &[&str]) {
+        let out = self.run(line);
+        assert_eq!(out.status, status, "{line}\n{}", out.stderr);
+        assert!(!out.stderr.contains("panicked"), "{line}\n{}", out.stderr);
+        assert!(out.stdout.is_empty(), "{line} printed {}", out.stdout);
+        for word in words {
+            assert!(
+                out.stderr.contains(word),
+                "{line}: no `{word}` in\n{}",
+                out.stderr
+            );
+        }
+    }
+
+    fn json(&self, name: &str) -> serde_json::Value {
+        let text = std::fs::read_to_string(self.path().join(name)).unwrap();
+        serde_json::from_str(&text).unwrap()
+    }
+}
+
+fn planar() -> &'static str {
+    excite::robot::bundled::find("planar2").unwrap().urdf
+}
+
+#[test]
+fn design_writes_everything_and_replaces_nothing() {
+    let t = Test::new();
+    let line = "design planar2 --starts 2 --rate 100 --periods 2 --output results";
+    let out = t.run(line);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(
+        out.stderr.is_empty(),
+        "no progress outside a terminal: {}",
+        out.stderr
+    );
+    assert!(
+        out.stdout.contains("all hold for all time"),
+        "{}",
+        out.stdout
+    );
+    assert!(
+        out.stdout.lines().all(|l| l.chars().count() <= 80),
+        "{}",
+        out.stdout
+    );
+
+    let report = t.json("results/report.json");
+    assert_eq!(report["robot"], "planar2");
+    assert_eq!(report["base_parameters"], 6);
+    assert_eq!(report["joints"].as_array().unwrap().len(), 2);
+    for key in ["invariant", "raw", "normalised", "weighted"] {
+        assert!(
+            report["condition_number"][key].as_f64().unwrap() >= 1.0,
+            "{key}"
+        );
+    }
+    assert!(report["rank_gap"].as_f64().unwrap() > 1e6);
+    assert!(report["log_det"].is_f64() && report["seconds"].is_f64());
+    assert_eq!(report["limits"]["satisfied"], true);
+    assert!(report["limits"]["worst"]["used"].as_f64().unwrap() <= 1.0);
+    assert!(report["limits"]["worst"]["joint"].is_string());
+    assert!(report["limits"]["worst"]["kind"].is_string());
+    assert_eq!(report["relative_std"].as_array().unwrap().len(), 6);
+    assert!(report["relative_std"][0]["combination"].is_string());
+
+    let samples = std::fs::read_to_string(t.path().join("results/samples.csv")).unwrap();
+    let mut lines = samples.lines();
+    assert_eq!(lines.next().unwrap(), "t,q1,q2,dq1,dq2,ddq1,ddq2,tau1,tau2");
+    assert_eq!(lines.count(), 2001);
+    let html = std::fs::read_to_string(t.path().join("results/report.html")).unwrap();
+    assert!(html.contains("<svg") && html.len() < 2_000_000);
+
+    // the torques of the file are those of `torque`
+    let torque = t.run("torque planar2 results/samples.csv");
+    assert_eq!(torque.status, 0, "{}", torque.stderr);
+    for (a, b) in samples
+        .lines()
+        .zip(torque.stdout.lines())
+        .skip(1)
+        .step_by(97)
+    {
+        let a: Vec<f64> = a.split(',').map(|x| x.parse().unwrap()).collect();
+        let b: Vec<f64> = b.split(',').map(|x| x.parse().unwrap()).collect();
+        assert!(
+            (a[7] - b[1]).abs() < 1e-9 && (a[8] - b[2]).abs() < 1e-9,
+            "{a:?} {b:?}"
+        );
+    }
+
+    let before = std::fs::read(t.path().join("results/trajectory.json")).unwrap();
+    t.fails(line, 1, &["exists", "--force"]);
+    assert_eq!(
+        before,
+        std::fs::read(t.path().join("results/trajectory.json")).unwrap()
+    );
+    assert_eq!(t.run(&format!("{line} --force --seed 2")).status, 0);
+    assert_ne!(
+        before,
+        std::fs::read(t.path().join("results/trajectory.json")).unwrap()
+    );
+
+    // the trajectory goes through `identifiability` and gets the same numbers
+    let out = t.run("identifiability planar2 results/trajectory.json --output check");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let again = t.json("results/report.json");
+    let check = t.json("check/report.json");
+    assert_eq!(again["condition_number"], check["condition_number"]);
+}
+
+#[test]
+fn robots_and_new() {
+    let t = Test::new().file("arm.urdf", planar());
+    let out = t.run("robots");
+    assert_eq!(out.status, 0);
+    assert!(out.stdout.contains("panda") && out.stdout.contains("scara"));
+    let out = t.run("new arm.urdf");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let t = t.file("robot.toml", &out.stdout);
+    let out = t.run("identifiability robot.toml --json --output r");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let json: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+    assert_eq!(json["base_parameters"], 6);
+}
+
+/// A bare URDF without limits, inertia or meshes that exist: warnings, and all commands work.
+#[test]
+fn a_urdf_from_the_wild() {
+    let urdf = r#"<robot name="wild">
+      <link name="base"/>
+      <link name="a"><inertial><mass value="2"/><origin xyz="0 0.1 0.2"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+        <visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual></link>
+      <link name="b"/>
+      <link name="finger"><inertial><mass value="0.1"/>
+        <inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="j1" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint>
+      <joint name="j2" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.4"/>
+        <axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="0" velocity="0"/></joint>
+      <joint name="j3" type="prismatic"><parent link="b"/><child link="finger"/><axis xyz="0 0 1"/>
+        <limit lower="0" upper="0.04" effort="20" velocity="0.2"/></joint>
+    </robot>"#;
+    let t = Test::new().file("wild.urdf", urdf);
+    let out = t.run("identifiability wild.urdf --output r");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(out.stderr.contains("warning"), "{}", out.stderr);
+    assert!(
+        !t.json("r/report.json")["warnings"]
+            .as_array()
+            .unwrap()
+            .is_empty()
+    );
+    let out = t.run("design wild.urdf --starts 1 --output d");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(out.stderr.contains("assumed"), "{}", out.stderr);
+    assert_eq!(t.json("d/report.json")["limits"]["satisfied"], true);
+    let html = std::fs::read_to_string(t.path().join("d/report.html")).unwrap();
+    assert!(html.contains("assumed for the design"));
+}
+
+#[test]
+fn unusable_arguments_have_status_2() {
+    let t = Test::new();
+    for (line, words) in [
+        ("design", &["ROBOT"][..]),
+        ("design panda --period 0", &["period"]),
+        ("design panda --period nan", &["period"]),
+        ("design panda --harmonics 1", &["harmonics"]),
+        ("design panda --harmonics -3", &["harmonics"]),
+        ("design panda --derate 2", &["derate"]),
+        ("design panda --rate 0", &["rate"]),
+        ("design panda --rate 1e300", &["rate"]),
+        ("design panda --starts 0", &["starts"]),
+        ("design panda --time-limit -1", &["time limit"]),
+        ("design panda --time-limit 1e999", &["time limit"]),
+        ("design panda --grid even", &["grid"]),
+        ("design panda --criterion f", &["criterion"]),
+        ("design panda --start 1,2", &["posture", "7"]),
+        ("design panda --start 9,0,0,-1,0,1,0", &["panda_joint1"]),
+        ("design panda --identify friction", &["identify", "coulomb"]),
+        ("design pandaa", &["pandaa", "panda"]),
+        ("identify panda", &["identify"]),
+    ] {
+        t.fails(line, 2, words);
+    }
+    assert_eq!(
+        std::fs::read_dir(t.path()).unwrap().count(),
+        0,
+        "nothing was written"
+    );
+}
+
+#[test]
+fn unusable_files_have_status_1_and_name_the_place() {
+    let latin = [b"<robot name=\"", &[0xff, 0xfe, 0xe9][..], b"\"/>"].concat();
+    let cut = &planar()[..planar().len() / 2];
+    let chain: String = (0..300)
+        .map(|i| {
+            format!(
+                "<link name=\"l{}\"/><joint name=\"j{i}\" type=\"revolute\"><parent link=\"l{i}\"/>\
+                 <child link=\"l{}\"/><limit lower=\"-1\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint>",
+                i + 1,
+                i + 1
+            )
+        })
+        .collect();
+    let cycle = "<robot name=\"c\"><link name=\"a\"/><link name=\"b\"/>\
+        <joint name=\"x\" type=\"fixed\"><parent link=\"a\"/><child link=\"b\"/></joint>\
+        <joint name=\"y\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
+    let t = Test::new()
+        .file("latin.urdf", latin)
+        .file("cut.urdf", cut)
+        .file(
+            "long.urdf",
+            format!("<robot name=\"l\"><link name=\"l0\"/>{chain}</robot>"),
+        )
+        .file("cycle.urdf", cycle)
+        .file("empty.urdf", "")
+        .file("arm.urdf", planar())
+        .file("key.toml", "urdf = \"arm.urdf\"\nspeed = 3\n")
+        .file(
+            "joint.toml",
+            "urdf = \"arm.urdf\"\n[[joint]]\nname = \"elbow\"\n",
+        )
+        .file(
+            "negative.toml",
+            "urdf = \"arm.urdf\"\n[[joint]]\nname = \"joint1\"\nvelocity = -1.0\n",
+        )
+        .file(
+            "nan.toml",
+            "urdf = \"arm.urdf\"\n[[joint]]\nname = \"joint1\"\nvelocity = nan\n",
+        )
+        .file("none.toml", "urdf = \"nowhere.urdf\"\n")
+        .file("bad.json", "{\"format\": \"excite-trajectory\"")
+        .file(
+            "ragged.csv",
+            "t,q1,q2,dq1,dq2,ddq1,ddq2\n0,0,0,0,0,0,0\n0.1,0,0\n",
+        )
+        .file("nan.csv", "t,q1,q2,dq1,dq2,ddq1,ddq2\n0,0,NaN,0,0,0,0\n")
+        .file("missing.csv", "t,q1,dq1,dq2,ddq1,ddq2\n0,0,0,0,0,0\n");
+    for (line, words) in [
+        ("design latin.urdf", &["latin.urdf", "UTF-8"][..]),
+        ("design cut.urdf", &["cut.urdf"]),
+        ("design long.urdf", &["long.urdf", "128"]),
+        ("design cycle.urdf", &["cycle.urdf"]),
+        ("design empty.urdf", &["empty.urdf"]),
+        ("design nowhere.urdf", &["nowhere.urdf"]),
+        ("design key.toml", &["key.toml", "speed"]),
+        ("design joint.toml", &["joint.toml", "elbow", "joint1"]),
+        ("design negative.toml", &["negative.toml", "velocity"]),
+        ("design nan.toml", &["nan.toml", "velocity"]),
+        ("design none.toml", &["nowhere.urdf"]),
+        ("identifiability arm.urdf bad.json", &["bad.json"]),
+        ("identifiability arm.urdf nowhere.json", &["nowhere.json"]),
+        ("torque arm.urdf ragged.csv", &["ragged.csv", "3"]),
+        ("torque arm.urdf nan.csv", &["nan.csv", "q2"]),
+        ("torque arm.urdf missing.csv", &["missing.csv", "q2"]),
+        ("torque arm.urdf nowhere.csv", &["nowhere.csv"]),
+    ] {
+        t.fails(line, 1, words);
+    }
+    assert!(!t.path().join("out").exists(), "nothing was written");
+}
+
+/// A trajectory of another robot is refused.
+#[test]
+fn trajectory_of_another_robot() {
+    let t = Test::new();
+    assert_eq!(t.run("design planar2 --starts 1 --output p").status, 0);
+    t.fails(
+        "identifiability panda p/trajectory.json --output q",
+        1,
+        &["p/trajectory.json"],
+    );
+}
+
+/// Damaged copies of a good trajectory end in a message, never in a panic.
+#[test]
+fn damaged_trajectories_are_refused() {
+    let t = Test::new();
+    assert_eq!(t.run("design planar2 --starts 1 --output p").status, 0);
+    let good = std::fs::read_to_string(t.path().join("p/trajectory.json")).unwrap();
+    for cut in (0..good.len()).step_by(good.len() / 12 + 1) {
+        std::fs::write(t.path().join("cut.json"), &good[..cut]).unwrap();
+        t.fails("identifiability planar2 cut.json", 1, &["cut.json"]);
+    }
+    for (from, to) in [
+        ("\"period\": 10.0", "\"period\": -1.0"),
+        ("\"version\": 1", "\"version\": 99"),
+        ("\"harmonics\": [", "\"harmonics\": [0, "),
+        ("joint1", "joint9"),
+    ] {
+        let bad = good.replacen(from, to, 1);
+        assert_ne!(bad, good, "{from} stands in the file");
+        std::fs::write(t.path().join("bad.json"), bad).unwrap();
+        t.fails("identifiability planar2 bad.json", 1, &["bad.json"]);
+    }
+}
+
+/// Ctrl-C keeps the best trajectory found so far.
+#[cfg(unix)]
+#[test]
+fn interrupt_keeps_the_best() {
+    let t = Test::new();
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("excite"))
+        .current_dir(t.path())
+        .args(["design", "planar2", "--starts", "1000000", "--output", "i"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let killed = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(killed.success());
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert_eq!(t.json("i/report.json")["limits"]["satisfied"], true);
+    assert_eq!(t.json("i/report.json")["status"], "interrupted");
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let t = Test::new();
+    for command in ["design", "identifiability", "torque", "robots", "new"] {
+        let out = t.run(&format!("{command} --help"));
+        assert_eq!(out.status, 0);
+        assert!(out.stdout.contains("Example"), "{command}");
+        assert!(
+            out.stdout.contains(&format!("excite {command}")),
+            "{command}"
+        );
+    }
+}
