@@ -84,12 +84,11 @@ fn smoothed_gradients_match_differences() {
             let s = objective.spectrum(&e.gram).unwrap();
             let g = objective.smooth_gradient(&info, &mut e, &s, 6.0);
             let size = g.iter().fold(0.0f64, |m, g| m.max(g.abs()));
-            for k in 0..x.len() {
+            for (k, g) in g.iter().enumerate() {
                 let d = difference(&x, k, &value);
                 assert!(
-                    (d - g[k]).abs() < 2e-4 * size,
-                    "{criterion:?} {condition:?} {k}: {d} {}",
-                    g[k]
+                    (d - g).abs() < 2e-4 * size,
+                    "{criterion:?} {condition:?} {k}: {d} {g}"
                 );
             }
         }

@@ -21,6 +21,10 @@
 //! and one down return `∂F/∂q, ∂F/∂q̇, ∂F/∂q̈` in `O(n)`, for the price of about four inverse
 //! dynamics: the reverse mode of the recursion above.
 
+// written with indices: iterators over arrays of wide packs are not inlined into the functions that
+// are compiled for them
+#![allow(clippy::needless_range_loop)]
+
 use super::lanes::*;
 use super::tree::{Node, Tree};
 use crate::robot::Motion;

@@ -1,6 +1,6 @@
 //! Inverse dynamics, the regressor and their exact derivatives, over batches of samples.
 //!
-//! A [`Tree`] is the immutable model, a [`Workspace`] the memory of one thread, a [`Motion`]
+//! A [`Tree`] is the immutable model, a [`Workspace`] the memory of one thread, [`Samples`]
 //! (positions, velocities, accelerations of many samples, joint by joint) the input. Every
 //! function writes into memory that the caller owns and allocates nothing once the workspace has
 //! grown to its size; several threads may share one [`Tree`].
