@@ -1,6 +1,6 @@
 //! `excite new FILE.urdf`.
 
-use excite::{Result, Robot};
+use excite::{Error, Result, Robot};
 
 /// Print a commented robot.toml for a URDF.
 #[derive(clap::Args)]
@@ -11,6 +11,12 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<()> {
+    if !args.urdf.ends_with(".urdf") {
+        return Err(Error::Argument(format!(
+            "`{}` is not a .urdf file; `excite new` writes the robot.toml that goes with one",
+            args.urdf
+        )));
+    }
     let robot = Robot::load(&args.urdf)?;
     super::warn(&robot.warnings);
     super::print(&robot.to_toml_template(&args.urdf))

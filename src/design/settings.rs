@@ -36,7 +36,8 @@ pub struct Settings {
     /// wall clock of the optimisation, s; given alone, starts go on until it ends
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_limit: Option<f64>,
-    /// threads; 0 for one per core
+    /// threads; 0 for one per core (not written to files: the result does not depend on it)
+    #[serde(skip_serializing)]
     pub threads: usize,
 }
 

@@ -279,7 +279,9 @@ pub fn read_columns(path: impl AsRef<Path>, names: &[String]) -> Result<Vec<Vec<
     for name in names {
         let mut found = (0..header.len()).filter(|&k| header[k] == *name);
         let Some(at) = found.next() else {
-            let message = format!("is missing; the columns are {}", header.join(", "));
+            // what is not a table at all is shown in part, and nothing that a terminal obeys
+            let list: String = header.join(", ").escape_debug().take(300).collect();
+            let message = format!("is missing; the columns are {list}");
             return Err(Error::file(path, format!("column {name}"), message));
         };
         if found.next().is_some() {
