@@ -7,6 +7,7 @@ pub mod design;
 pub mod dynamics;
 pub mod error;
 pub mod identifiability;
+pub mod mechanism;
 pub mod output;
 pub mod regressor;
 pub mod robot;
