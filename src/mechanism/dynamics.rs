@@ -11,6 +11,7 @@
 
 use super::Mechanism;
 use super::geometry::{Pass, run};
+use super::task::{PITCH_MARGIN, Task};
 use crate::dynamics::lanes::{Isa, Lanes};
 use crate::dynamics::{Derivatives, Samples, Workspace};
 use crate::error::{Error, Result};
@@ -19,9 +20,12 @@ use crate::robot::JointTerm;
 use faer::Mat;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::f64::consts::FRAC_PI_2;
 
-/// Samples that one thread handles at a time: `D` and `G` of a hexapod stay in the cache.
-const CHUNK: usize = 128;
+/// Samples that one thread handles at a time, so that a regressor of a hexapod (6 kB a sample) is
+/// written into the cache and copied from there: written straight into a large matrix, its 780
+/// streams cost three times the arithmetic.
+const CHUNK: usize = 64;
 
 /// A motion of the whole mechanism.
 #[derive(Debug, Clone, Default)]
@@ -51,6 +55,8 @@ pub struct ClosedWorkspace {
     u: Vec<f64>,
     z: Vec<f64>,
     curvature: Vec<f64>,
+    part: Samples,
+    raw: Vec<f64>,
 }
 
 /// Gradients by the task coordinates and their two derivatives: parameter vector `v`, task
@@ -152,17 +158,21 @@ fn finite(a: &[f64]) -> bool {
     a.iter().map(|x| x * 0.0).sum::<f64>() == 0.0
 }
 
-/// Samples `from .. to` of a motion.
-pub(super) fn slice(x: &Samples, from: usize, to: usize) -> Samples {
-    let mut part = Samples::zeros(x.dof, to - from);
-    for k in 0..x.dof {
-        let (a, b) = (k * x.count + from, k * x.count + to);
-        let at = k * (to - from)..(k + 1) * (to - from);
-        part.q[at.clone()].copy_from_slice(&x.q[a..b]);
-        part.qd[at.clone()].copy_from_slice(&x.qd[a..b]);
-        part.qdd[at].copy_from_slice(&x.qdd[a..b]);
+/// Samples `from .. to` of a motion, into memory that is reused.
+fn slice(x: &Samples, from: usize, to: usize, part: &mut Samples) {
+    let n = to - from;
+    part.dof = x.dof;
+    part.count = n;
+    for (to, source) in [
+        (&mut part.q, &x.q),
+        (&mut part.qd, &x.qd),
+        (&mut part.qdd, &x.qdd),
+    ] {
+        to.clear();
+        for k in 0..x.dof {
+            to.extend_from_slice(&source[k * x.count + from..][..n]);
+        }
     }
-    part
 }
 
 impl Mechanism {
@@ -199,6 +209,12 @@ impl Mechanism {
         if count == 0 {
             return Ok(());
         }
+        if self.task == Task::Pose {
+            let steep = FRAC_PI_2 - PITCH_MARGIN;
+            if x.q[4 * count..5 * count].iter().any(|p| p.abs() > steep) {
+                return Err(self.why_not(x, None));
+            }
+        }
         self.geometry.motion(isa, x, &mut out.tree, &mut out.d);
         match (m, na) {
             (3, 3) => self.actuation::<3>(isa, count, out),
@@ -209,28 +225,33 @@ impl Mechanism {
         if finite(&out.tree.qdd) && finite(&out.tree.q) && finite(&out.g) {
             return Ok(());
         }
-        Err(self.why_not(x, out))
+        Err(self.why_not(x, Some(out)))
     }
 
     /// The first sample that failed, and why.
-    fn why_not(&self, x: &Samples, out: &ClosedMotion) -> Error {
+    fn why_not(&self, x: &Samples, out: Option<&ClosedMotion>) -> Error {
         let count = x.count;
         for s in 0..count {
-            let bad = |a: &[f64], rows: usize| (0..rows).any(|i| !a[i * count + s].is_finite());
-            let lost = bad(&out.tree.q, out.tree.dof) || bad(&out.tree.qdd, out.tree.dof);
-            if !lost && !bad(&out.g, out.tree.dof * self.actuators()) {
-                continue;
-            }
             let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * count + s]).collect();
-            let why = self.problem(&pose).unwrap_or_else(|| match lost {
-                true => "the motion is not finite there".into(),
-                false => "the actuation Jacobian is singular: σ_min = 0".into(),
+            let why = self.problem(&pose).or_else(|| {
+                let out = out?;
+                let bad = |a: &[f64], rows: usize| (0..rows).any(|i| !a[i * count + s].is_finite());
+                let n = out.tree.dof;
+                if bad(&out.tree.q, n) || bad(&out.tree.qdd, n) {
+                    Some("the motion is not finite there".to_string())
+                } else if bad(&out.g, n * self.actuators()) {
+                    Some("the actuation Jacobian is singular: σ_min = 0".to_string())
+                } else {
+                    None
+                }
             });
-            return Error::Infeasible(format!(
-                "{}: sample {s} at {} cannot be taken: {why}",
-                self.robot.name,
-                self.show(&pose)
-            ));
+            if let Some(why) = why {
+                return Error::Infeasible(format!(
+                    "{}: sample {s} at {} cannot be taken: {why}",
+                    self.robot.name,
+                    self.show(&pose)
+                ));
+            }
         }
         Error::Infeasible(format!("{}: the motion is not finite", self.robot.name))
     }
@@ -323,49 +344,124 @@ impl Mechanism {
         (self.actuators() == self.freedoms()).then_some(if i == a { 1.0 } else { 0.0 })
     }
 
-    /// The stacked regressor `W` of a motion of the task coordinates: row `a·count + s` is
-    /// actuator `a` at sample `s`, columns are [`Parameters::list`](super::Parameters). On all
-    /// threads of the pool.
+    /// Regressor of the samples `from .. to` alone, in the cache: actuator `a`, sample `s`, raw
+    /// column `c` at `(c·actuators + a)·(to − from) + s` of the result. For sums over samples, such
+    /// as an information matrix, that never need the whole of `W`.
     ///
     /// # Errors
     /// As [`Mechanism::motion`].
-    pub fn regressor(&self, x: &Samples) -> Result<Mat<f64>> {
+    ///
+    /// # Panics
+    /// If the motion does not have these samples.
+    pub fn raw_block<'a>(
+        &self,
+        ws: &'a mut ClosedWorkspace,
+        x: &Samples,
+        from: usize,
+        to: usize,
+    ) -> Result<&'a [f64]> {
+        let isa = ws.tree.isa();
+        slice(x, from, to, &mut ws.part);
+        self.motion_into(isa, &ws.part, &mut ws.motion)
+            .map_err(|e| shifted(e, from))?;
+        let n = to - from;
+        let rows = self.actuators() * n;
+        ws.raw.resize(rows * self.parameters.raw_count(), 0.0);
+        self.raw_regressor(&mut ws.tree, &ws.motion, &mut ws.raw, rows, n);
+        Ok(&ws.raw)
+    }
+
+    /// The stacked regressor `W` of a motion of the task coordinates, column by column: row
+    /// `a·count + s` is actuator `a` at sample `s`, columns are
+    /// [`Parameters::list`](super::Parameters). On this thread.
+    ///
+    /// # Errors
+    /// As [`Mechanism::motion`].
+    ///
+    /// # Panics
+    /// If `w` has not `actuators·count` rows for each parameter.
+    pub fn regressor_into(
+        &self,
+        ws: &mut ClosedWorkspace,
+        x: &Samples,
+        w: &mut [f64],
+    ) -> Result<()> {
         let (na, count) = (self.actuators(), x.count);
-        let list = &self.parameters.list;
-        let chunks = self.chunks(count);
-        let parts: Vec<Result<Vec<f64>>> = chunks
-            .par_iter()
-            .map_init(ClosedWorkspace::default, |ws, &(from, to)| {
-                let part = slice(x, from, to);
-                let isa = ws.tree.isa();
-                self.motion_into(isa, &part, &mut ws.motion)
-                    .map_err(|e| shifted(e, from))?;
-                let rows = na * part.count;
-                let mut raw = vec![0.0; rows * self.parameters.raw_count()];
-                self.raw_regressor(&mut ws.tree, &ws.motion, &mut raw, rows, part.count);
-                Ok(raw)
-            })
-            .collect();
-        let mut w = Mat::zeros(na * count, list.len());
-        for (&(from, to), part) in chunks.iter().zip(parts) {
-            let part = part?;
-            let n = to - from;
-            for (c, p) in list.iter().enumerate() {
-                let column = w.col_as_slice_mut(c);
-                for &r in &p.raw {
-                    for a in 0..na {
-                        let source = &part[(r * na + a) * n..][..n];
-                        let to = &mut column[a * count + from..][..n];
-                        to.iter_mut().zip(source).for_each(|(t, s)| *t += s);
+        let rows = na * count;
+        assert_eq!(w.len(), rows * self.parameters.list.len(), "size of W");
+        for (from, to) in self.chunks(count) {
+            let part = self.raw_block(ws, x, from, to)?;
+            self.scatter(part, from, to, count, |c| {
+                w[c * rows..][..rows].as_mut_ptr()
+            });
+        }
+        Ok(())
+    }
+
+    /// Copies the block of samples `from .. to` to the columns.
+    fn scatter(
+        &self,
+        part: &[f64],
+        from: usize,
+        to: usize,
+        count: usize,
+        mut column: impl FnMut(usize) -> *mut f64,
+    ) {
+        let (na, n) = (self.actuators(), to - from);
+        assert!(to <= count);
+        for (c, p) in self.parameters.list.iter().enumerate() {
+            let column = column(c);
+            for a in 0..na {
+                // SAFETY: columns have na·count rows, and rows from .. to of an actuator are written
+                // by the one thread that has this block
+                let to = unsafe { std::slice::from_raw_parts_mut(column.add(a * count + from), n) };
+                for (i, &r) in p.raw.iter().enumerate() {
+                    let source = &part[(r * na + a) * n..][..n];
+                    match i {
+                        0 => to.copy_from_slice(source),
+                        _ => to.iter_mut().zip(source).for_each(|(t, s)| *t += s),
                     }
                 }
             }
         }
+    }
+
+    /// [`Mechanism::regressor_into`] on all threads of the pool.
+    ///
+    /// # Errors
+    /// As [`Mechanism::motion`].
+    pub fn regressor(&self, x: &Samples) -> Result<Mat<f64>> {
+        /// The matrix, shared by threads that write different rows.
+        struct Columns(Vec<*mut f64>);
+        // SAFETY: see above
+        unsafe impl Sync for Columns {}
+        impl Columns {
+            fn at(&self, c: usize) -> *mut f64 {
+                self.0[c]
+            }
+        }
+        let count = x.count;
+        let mut w = Mat::zeros(self.actuators() * count, self.parameters.list.len());
+        let columns = Columns(
+            (0..w.ncols())
+                .map(|c| w.col_as_slice_mut(c).as_mut_ptr())
+                .collect(),
+        );
+        self.chunks(count)
+            .par_iter()
+            .map_init(ClosedWorkspace::default, |ws, &(from, to)| {
+                let part = self.raw_block(ws, x, from, to)?;
+                self.scatter(part, from, to, count, |c| columns.at(c));
+                Ok(())
+            })
+            .collect::<Vec<Result<()>>>()
+            .into_iter()
+            .collect::<Result<()>>()?;
         Ok(w)
     }
 
-    /// Pieces that may be handled on their own.
-    fn chunks(&self, count: usize) -> Vec<(usize, usize)> {
+    /// Pieces of a batch that may be handled on their own, see [`Mechanism::raw_block`].
+    pub fn chunks(&self, count: usize) -> Vec<(usize, usize)> {
         let size = match self.geometry.sequential() {
             true => count.max(1),
             false => CHUNK,

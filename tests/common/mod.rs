@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod parallel;
+pub mod tripod;
 
 use excite::dynamics::Samples;
 use excite::robot::{Body, Inertia, Joint, Limits, Motion, Prior, Robot};
