@@ -55,6 +55,7 @@ pub mod design;
 pub mod dynamics;
 pub mod error;
 pub mod identifiability;
+pub mod mechanism;
 pub mod output;
 pub mod regressor;
 pub mod report;

@@ -208,6 +208,135 @@ pub(crate) struct Sink {
     pub row: usize,
 }
 
+/// What the regressor of a body needs of its motion.
+#[derive(Clone, Copy)]
+struct State<L> {
+    omega: V3<L>,
+    alpha: V3<L>,
+    acc: V3<L>,
+    /// `skew(α) + skew(ω)²`
+    d: M3<L>,
+}
+
+impl<L: Lanes> State<L> {
+    #[inline(always)]
+    fn of(b: &Frame<L>) -> Self {
+        let (o, al) = (get(&b.omega), get(&b.alpha));
+        let (xy, xz, yz) = (o[0] * o[1], o[0] * o[2], o[1] * o[2]);
+        let (xx, yy, zz) = (o[0] * o[0], o[1] * o[1], o[2] * o[2]);
+        State {
+            omega: o,
+            alpha: al,
+            acc: get(&b.acc),
+            d: [
+                [-(yy + zz), xy - al[2], xz + al[1]],
+                [xy + al[2], -(xx + zz), yz - al[0]],
+                [xz - al[1], yz + al[0], -(xx + yy)],
+            ],
+        }
+    }
+
+    /// `v·f + w·n` for unit values of the ten parameters.
+    #[inline(always)]
+    fn row(&self, v: V3<L>, w: V3<L>) -> [L; 10] {
+        let (o, al, a) = (self.omega, self.alpha, self.acc);
+        let vd = mul_t(&self.d, v);
+        let aw = cross(a, w);
+        let u = cross(w, o);
+        [
+            dot(v, a),
+            vd[0] + aw[0],
+            vd[1] + aw[1],
+            vd[2] + aw[2],
+            w[0] * al[0] + u[0] * o[0],
+            w[0] * al[1] + w[1] * al[0] + u[0] * o[1] + u[1] * o[0],
+            w[0] * al[2] + w[2] * al[0] + u[0] * o[2] + u[2] * o[0],
+            w[1] * al[1] + u[1] * o[1],
+            w[1] * al[2] + w[2] * al[1] + u[1] * o[2] + u[2] * o[1],
+            w[2] * al[2] + u[2] * o[2],
+        ]
+    }
+}
+
+/// Motions `(v_ij, w_ij)` that a unit rate of each joint of its chain gives to body `j`.
+#[inline(always)]
+fn unit_twists<L: Lanes>(
+    tree: &Tree,
+    j: usize,
+    frames: &[Frame<L>],
+    twists: &mut [(V3<L>, V3<L>)],
+) {
+    let first = tree.twist_start[j];
+    let last = tree.chains[j].len() - 1;
+    if let Some(parent) = tree.nodes[j].parent {
+        let from = tree.twist_start[parent];
+        let Frame { r, p, .. } = &frames[j];
+        for k in 0..last {
+            let (v, w) = (get(&twists[from + k].0), get(&twists[from + k].1));
+            let (v, w) = (mul_t(r, add(v, cross(w, get(p)))), mul_t(r, w));
+            set(&mut twists[first + k].0, v);
+            set(&mut twists[first + k].1, w);
+        }
+    }
+    let axis = splat3::<L>(&tree.nodes[j].axis);
+    let (v, w) = match tree.nodes[j].motion {
+        Motion::Revolute => (zero(), axis),
+        Motion::Prismatic => (axis, zero()),
+    };
+    set(&mut twists[first + last].0, v);
+    set(&mut twists[first + last].1, w);
+}
+
+/// The regressor of a closed chain for one pack: `Y = Gᵀ Y_tree`, `G = ∂q/∂q_a` being handed in.
+/// Body `bodies[b]` writes columns `10·b ..`; actuator `a` is a row. For each body the motions of
+/// its chain are first combined to the motion that a unit rate of the actuator gives,
+/// `Σ_i G_ia (v_ij, w_ij)`, so that the ten columns are computed once per actuator.
+///
+/// # Safety
+/// `pack` as in [`kinematics`]; `g` must hold coordinate `i`, actuator `a` at
+/// `(i·actuators + a)·pack.stride`; `sink` must cover `10·bodies` columns and `actuators` rows.
+#[inline(always)]
+pub(crate) unsafe fn projected_regressor<L: Lanes>(
+    tree: &Tree,
+    bodies: &[usize],
+    pack: Pack,
+    g: *const f64,
+    actuators: usize,
+    s: &mut Scratch<L>,
+    sink: Sink,
+) {
+    // SAFETY: by the caller's promise
+    unsafe { kinematics(tree, pack, s) };
+    let Scratch { frames, twists, .. } = s;
+    for j in 0..tree.nodes.len() {
+        unit_twists(tree, j, frames, twists);
+    }
+    for (b, &j) in bodies.iter().enumerate() {
+        let state = State::of(&frames[j]);
+        let first = tree.twist_start[j];
+        for a in 0..actuators {
+            let (mut v, mut w) = (zero(), zero());
+            for (k, &i) in tree.chains[j].iter().enumerate() {
+                let node = &tree.nodes[i];
+                // SAFETY: by the caller's promise
+                let rate =
+                    unsafe { L::load(g.add((node.coordinate * actuators + a) * pack.stride)) }
+                        * node.ratio;
+                v = add(v, scale(get(&twists[first + k].0), rate));
+                w = add(w, scale(get(&twists[first + k].1), rate));
+            }
+            let y = state.row(v, w);
+            // SAFETY: by the caller's promise
+            unsafe {
+                let at = sink.base.add(10 * b * sink.column + a * sink.row);
+                for c in 0..10 {
+                    y[c].store(at.add(c * sink.column));
+                }
+            }
+        }
+    }
+}
+
 /// Writes the ten columns of every body for one pack; blocks that are zero by structure are not
 /// touched.
 ///
@@ -220,52 +349,12 @@ pub(crate) unsafe fn regressor<L: Lanes>(tree: &Tree, pack: Pack, s: &mut Scratc
     unsafe { kinematics(tree, pack, s) };
     let Scratch { frames, twists, .. } = s;
     for (j, chain) in tree.chains.iter().enumerate() {
-        let b = &frames[j];
-        let (o, al, a) = (get(&b.omega), get(&b.alpha), get(&b.acc));
-        // D = skew(α) + skew(ω)²
-        let (xy, xz, yz) = (o[0] * o[1], o[0] * o[2], o[1] * o[2]);
-        let (xx, yy, zz) = (o[0] * o[0], o[1] * o[1], o[2] * o[2]);
-        let d: M3<L> = [
-            [-(yy + zz), xy - al[2], xz + al[1]],
-            [xy + al[2], -(xx + zz), yz - al[0]],
-            [xz - al[1], yz + al[0], -(xx + yy)],
-        ];
+        let state = State::of(&frames[j]);
         let first = tree.twist_start[j];
-        let last = chain.len() - 1;
-        if let Some(parent) = tree.nodes[j].parent {
-            let from = tree.twist_start[parent];
-            let Frame { r, p, .. } = &frames[j];
-            for k in 0..last {
-                let (v, w) = (get(&twists[from + k].0), get(&twists[from + k].1));
-                let (v, w) = (mul_t(r, add(v, cross(w, get(p)))), mul_t(r, w));
-                set(&mut twists[first + k].0, v);
-                set(&mut twists[first + k].1, w);
-            }
-        }
-        let axis = splat3::<L>(&tree.nodes[j].axis);
-        let (v, w) = match tree.nodes[j].motion {
-            Motion::Revolute => (zero(), axis),
-            Motion::Prismatic => (axis, zero()),
-        };
-        set(&mut twists[first + last].0, v);
-        set(&mut twists[first + last].1, w);
+        unit_twists(tree, j, frames, twists);
         for (k, &i) in chain.iter().enumerate() {
             let (v, w) = (get(&twists[first + k].0), get(&twists[first + k].1));
-            let vd = mul_t(&d, v);
-            let aw = cross(a, w);
-            let u = cross(w, o);
-            let y = [
-                dot(v, a),
-                vd[0] + aw[0],
-                vd[1] + aw[1],
-                vd[2] + aw[2],
-                w[0] * al[0] + u[0] * o[0],
-                w[0] * al[1] + w[1] * al[0] + u[0] * o[1] + u[1] * o[0],
-                w[0] * al[2] + w[2] * al[0] + u[0] * o[2] + u[2] * o[0],
-                w[1] * al[1] + u[1] * o[1],
-                w[1] * al[2] + w[2] * al[1] + u[1] * o[2] + u[2] * o[1],
-                w[2] * al[2] + u[2] * o[2],
-            ];
+            let y = state.row(v, w);
             let node = &tree.nodes[i];
             // SAFETY: by the caller's promise
             unsafe {

@@ -4,10 +4,12 @@
 //! sample. It is compiled for one sample (`f64`), for a portable pack of four, and on x86-64 for
 //! AVX2 (4 samples) and AVX-512 (8 samples), chosen at run time by [`Isa::detect`].
 //!
-//! Only additions, subtractions and multiplications are used and none is fused, so that every
-//! width returns **bit-identical** results: the answer does not depend on the machine.
+//! Only exactly rounded operations (`+ − × ÷ √`) are used and none is fused, so that every width
+//! returns **bit-identical** results: the answer does not depend on the machine. The one exception
+//! is [`Lanes::atan2`], which asks the standard library lane by lane: the same bits from every
+//! width, but from the mathematical library of the machine.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A pack of `WIDTH` numbers, one per sample.
 pub trait Lanes:
@@ -15,6 +17,7 @@ pub trait Lanes:
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
+    + Div<Output = Self>
     + Neg<Output = Self>
     + Mul<f64, Output = Self>
 {
@@ -32,6 +35,10 @@ pub trait Lanes:
     /// # Safety
     /// `p .. p + WIDTH` must be writable.
     unsafe fn store(self, p: *mut f64);
+    /// Square root of every lane; not a number where it is negative.
+    fn sqrt(self) -> Self;
+    /// Angle of the vector `(x, self)` of every lane, rad.
+    fn atan2(self, x: Self) -> Self;
 }
 
 impl Lanes for f64 {
@@ -49,6 +56,21 @@ impl Lanes for f64 {
     unsafe fn store(self, p: *mut f64) {
         // SAFETY: by the caller's promise
         unsafe { *p = self }
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        f64::atan2(self, x)
+    }
+}
+
+/// Angles lane by lane, in place of `y`.
+fn angles(y: &mut [f64], x: &[f64]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y = y.atan2(*x);
     }
 }
 
@@ -72,6 +94,7 @@ macro_rules! portable_op {
 portable_op!(Add, add, +);
 portable_op!(Sub, sub, -);
 portable_op!(Mul, mul, *);
+portable_op!(Div, div, /);
 
 impl Mul<f64> for Portable4 {
     type Output = Self;
@@ -103,6 +126,15 @@ impl Lanes for Portable4 {
         // SAFETY: by the caller's promise
         unsafe { *(p as *mut [f64; 4]) = self.0 }
     }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Portable4(self.0.map(f64::sqrt))
+    }
+    #[inline(always)]
+    fn atan2(mut self, x: Self) -> Self {
+        angles(&mut self.0, &x.0);
+        self
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -111,8 +143,8 @@ mod x86 {
     use std::arch::x86_64::*;
 
     macro_rules! pack {
-        ($name:ident, $reg:ty, $width:literal, $add:ident, $sub:ident, $mul:ident, $set1:ident,
-         $load:ident, $store:ident, $doc:literal) => {
+        ($name:ident, $reg:ty, $width:literal, $add:ident, $sub:ident, $mul:ident, $div:ident,
+         $sqrt:ident, $set1:ident, $load:ident, $store:ident, $doc:literal) => {
             #[doc = $doc]
             #[derive(Clone, Copy)]
             pub struct $name($reg);
@@ -137,6 +169,13 @@ mod x86 {
                 #[inline(always)]
                 fn mul(self, o: Self) -> Self {
                     $name(unsafe { $mul(self.0, o.0) })
+                }
+            }
+            impl Div for $name {
+                type Output = Self;
+                #[inline(always)]
+                fn div(self, o: Self) -> Self {
+                    $name(unsafe { $div(self.0, o.0) })
                 }
             }
             impl Mul<f64> for $name {
@@ -167,6 +206,20 @@ mod x86 {
                 unsafe fn store(self, p: *mut f64) {
                     unsafe { $store(p, self.0) }
                 }
+                #[inline(always)]
+                fn sqrt(self) -> Self {
+                    $name(unsafe { $sqrt(self.0) })
+                }
+                #[inline(always)]
+                fn atan2(self, x: Self) -> Self {
+                    let (mut a, mut b) = ([0.0; $width], [0.0; $width]);
+                    unsafe {
+                        self.store(a.as_mut_ptr());
+                        x.store(b.as_mut_ptr());
+                        angles(&mut a, &b);
+                        Self::load(a.as_ptr())
+                    }
+                }
             }
         };
     }
@@ -177,6 +230,8 @@ mod x86 {
         _mm256_add_pd,
         _mm256_sub_pd,
         _mm256_mul_pd,
+        _mm256_div_pd,
+        _mm256_sqrt_pd,
         _mm256_set1_pd,
         _mm256_loadu_pd,
         _mm256_storeu_pd,
@@ -189,6 +244,8 @@ mod x86 {
         _mm512_add_pd,
         _mm512_sub_pd,
         _mm512_mul_pd,
+        _mm512_div_pd,
+        _mm512_sqrt_pd,
         _mm512_set1_pd,
         _mm512_loadu_pd,
         _mm512_storeu_pd,
@@ -228,6 +285,21 @@ impl Isa {
             }
         }
         Isa::Portable
+    }
+
+    /// Whether this machine can run it.
+    pub fn is_available(self) -> bool {
+        match self {
+            Isa::Scalar | Isa::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => {
+                std::arch::is_x86_feature_detected!("avx512f")
+                    && std::arch::is_x86_feature_detected!("avx512dq")
+                    && std::arch::is_x86_feature_detected!("avx2")
+            }
+        }
     }
 
     /// All that this machine can run.

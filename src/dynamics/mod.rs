@@ -133,6 +133,11 @@ impl Default for Workspace {
 }
 
 impl Workspace {
+    /// The instruction set that it runs with.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
     /// A workspace for a given instruction set (for tests and benchmarks).
     ///
     /// # Panics
@@ -252,6 +257,39 @@ impl Job for RegressorJob<'_> {
                 ..self.sink
             };
             kernel::regressor(self.tree, self.motion.pack(i), s, sink);
+        }
+    }
+}
+
+struct ProjectedJob<'a> {
+    tree: &'a Tree,
+    bodies: &'a [usize],
+    motion: &'a Samples,
+    g: &'a [f64],
+    actuators: usize,
+    sink: Sink,
+}
+impl Job for ProjectedJob<'_> {
+    fn tree(&self) -> &Tree {
+        self.tree
+    }
+    #[inline(always)]
+    unsafe fn pack<L: Lanes>(&self, i: usize, s: &mut Scratch<L>) {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let sink = Sink {
+                base: self.sink.base.add(i),
+                ..self.sink
+            };
+            kernel::projected_regressor(
+                self.tree,
+                self.bodies,
+                self.motion.pack(i),
+                self.g.as_ptr().add(i),
+                self.actuators,
+                s,
+                sink,
+            );
         }
     }
 }
@@ -402,6 +440,53 @@ impl Tree {
             motion,
             sink,
         }
+    }
+
+    /// Rigid-body regressor of a closed chain, `Y = Gᵀ Y_tree`, for the bodies listed: entry of
+    /// actuator `a`, sample `i`, column `10·b + k` (parameter `k` of body `bodies[b]`) at
+    /// `w[(10·b + k)·stride + a·row + i]`. `g` holds `G = ∂q/∂q_a`: coordinate `c`, actuator `a`,
+    /// sample `i` at `(c·actuators + a)·count + i`.
+    ///
+    /// # Panics
+    /// If an array is too short, a body does not exist or the motion is of another robot.
+    #[allow(clippy::too_many_arguments)]
+    pub fn projected_regressor(
+        &self,
+        ws: &mut Workspace,
+        bodies: &[usize],
+        motion: &Samples,
+        g: &[f64],
+        actuators: usize,
+        w: &mut [f64],
+        stride: usize,
+        row: usize,
+    ) {
+        motion.check(self);
+        let count = motion.count;
+        assert!(bodies.iter().all(|&b| b < self.bodies()), "no such body");
+        assert!(g.len() >= self.dof() * actuators * count, "G is too short");
+        if bodies.is_empty() || actuators == 0 || count == 0 {
+            return;
+        }
+        assert!(
+            row >= count
+                && w.len() >= stride * (10 * bodies.len() - 1) + row * (actuators - 1) + count,
+            "the regressor does not fit"
+        );
+        let sink = Sink {
+            base: w.as_mut_ptr(),
+            column: stride,
+            row,
+        };
+        let job = ProjectedJob {
+            tree: self,
+            bodies,
+            motion,
+            g,
+            actuators,
+            sink,
+        };
+        run(&job, 0, count, ws);
     }
 
     /// Inverse dynamics of the rigid bodies: `τ = Y φ` by recursive Newton-Euler, coordinate `j`

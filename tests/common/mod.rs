@@ -1,6 +1,9 @@
 //! Random robots and motions for the identity tests.
 #![allow(dead_code)]
 
+pub mod parallel;
+pub mod tripod;
+
 use excite::dynamics::Samples;
 use excite::robot::{Body, Inertia, Joint, Limits, Motion, Prior, Robot};
 use nalgebra::{Matrix3, Rotation3, Vector3};

@@ -1,0 +1,285 @@
+//! Parallel robots: closed chains from the inverse kinematics of their platform.
+//!
+//! A mechanism is a **tree** ([`Robot`]: all bodies, one coordinate a joint, passive ones included,
+//! the platform on massless bodies that move along its task coordinates), of which some coordinates
+//! are **actuated**, and a [`Geometry`] that gives all tree coordinates from the **task**
+//! coordinates, `q = F(x)`. With `D = ∂q/∂x`, `D_a` its actuated rows and `D_a⁺` the inverse (or,
+//! with more actuators than freedoms, the pseudo-inverse, i.e. the actuator forces of least norm):
+//!
+//! ```text
+//! G = ∂q/∂q_a = D D_a⁺      Γ = Gᵀ Γ_tree      Y = Gᵀ Y_tree
+//! ```
+//!
+//! (Khalil & Dombre 2002, ch. 8; principle of virtual work.) A new mechanism is one file: its
+//! [`Kinematics`] and the tree it puts together with [`tree::Builder`]; see
+//! [`gough_stewart`] for an example.
+
+pub mod delta;
+mod dynamics;
+mod forward;
+pub mod geometry;
+pub mod gough_stewart;
+pub mod h4;
+pub mod parallelogram;
+pub mod parameters;
+pub mod scalar;
+mod singularity;
+pub mod task;
+pub mod tree;
+
+pub use dynamics::{ClosedMotion, ClosedWorkspace, TaskDerivatives};
+pub use forward::Solution;
+pub use geometry::{Closed, Cone, Coordinates, Geometry, Kinematics, Segment};
+pub use parameters::{Group, Parameter, Parameters, Pattern};
+pub use singularity::{SINGULAR, Singularity, Spread};
+pub use task::{PlatformMotion, Task};
+
+use crate::dynamics::{Samples, Tree};
+use crate::error::{Error, Result, Warning};
+use crate::robot::{Limits, Robot};
+
+/// What a mechanism is put together from.
+#[derive(Debug)]
+pub struct Setup {
+    /// `mechanism = …` of the robot file
+    pub kind: &'static str,
+    /// the tree
+    pub robot: Robot,
+    /// indices of the actuated coordinates, in the order of the columns of logs
+    pub actuated: Vec<usize>,
+    /// what the task coordinates are
+    pub task: Task,
+    /// kinematics
+    pub geometry: Box<dyn Geometry>,
+    /// unknown bodies; bodies in no group keep their inertia as known
+    pub groups: Vec<Group>,
+    /// task coordinates of the middle of the workspace
+    pub home: Vec<f64>,
+    /// characteristic length by which angles are turned into lengths, m
+    pub length: f64,
+}
+
+/// A closed chain. See the [module](self) documentation.
+#[derive(Debug)]
+pub struct Mechanism {
+    /// `gough-stewart`, `h4`, `delta`, `loops`
+    pub kind: &'static str,
+    /// the tree; its joints are all coordinates
+    pub robot: Robot,
+    /// actuated coordinates
+    pub actuated: Vec<usize>,
+    /// what the task coordinates are
+    pub task: Task,
+    /// names of the task coordinates
+    pub task_names: Vec<String>,
+    /// range, rate and acceleration of each task coordinate: the workspace box (jerk and effort are
+    /// not used)
+    pub workspace: Vec<Limits>,
+    /// the unknowns
+    pub parameters: Parameters,
+    /// task coordinates of the middle of the workspace
+    pub home: Vec<f64>,
+    /// characteristic length, m: an angle of 1 rad counts as this much
+    pub length: f64,
+    /// what was imperfect, a home close to a singularity among them
+    pub warnings: Vec<Warning>,
+    geometry: Box<dyn Geometry>,
+    tree: Tree,
+}
+
+impl Mechanism {
+    /// Checks a mechanism and makes it ready for use. The workspace is a cautious box about home
+    /// until [`Mechanism::workspace`] is set.
+    ///
+    /// # Errors
+    /// Fewer actuators than freedoms, an actuator listed twice, a home that cannot be reached.
+    /// A singular home and redundant actuators are warnings.
+    pub fn new(setup: Setup) -> Result<Self> {
+        let Setup {
+            kind,
+            mut robot,
+            actuated,
+            task,
+            geometry,
+            groups,
+            home,
+            length,
+        } = setup;
+        let freedoms = task.count();
+        let name = robot.name.clone();
+        let about = |message: String| Error::Infeasible(format!("{name}: {message}"));
+        if home.len() != freedoms || geometry.task() != freedoms {
+            return Err(about(format!(
+                "home has {} numbers, the mechanism {freedoms} freedoms",
+                home.len()
+            )));
+        }
+        if geometry.coordinates() != robot.dof() {
+            return Err(about(format!(
+                "the kinematics has {} coordinates, the tree {}",
+                geometry.coordinates(),
+                robot.dof()
+            )));
+        }
+        for (i, a) in actuated.iter().enumerate() {
+            let Some(joint) = robot.joints.get(*a) else {
+                return Err(about(format!("there is no coordinate {a} to be actuated")));
+            };
+            if actuated[..i].contains(a) {
+                return Err(about(format!("actuator `{}` is listed twice", joint.name)));
+            }
+        }
+        if actuated.len() < freedoms {
+            return Err(about(format!(
+                "an actuator is missing: {freedoms} freedoms but {} actuated joints",
+                actuated.len()
+            )));
+        }
+        let task_names: Vec<String> = match task {
+            Task::Joints(_) => geometry_joint_names(&robot, &actuated, freedoms),
+            _ => task.names().iter().map(|n| n.to_string()).collect(),
+        };
+        let (parameters, mut warnings) = Parameters::new(&mut robot, &groups);
+        if actuated.len() > freedoms {
+            warnings.push(Warning::new(
+                "actuators",
+                format!(
+                    "{} actuators for {freedoms} freedoms: the forces are not unique; those of \
+                     least norm are used",
+                    actuated.len()
+                ),
+            ));
+        }
+        let workspace = (0..freedoms)
+            .map(|k| {
+                let reach = match task {
+                    Task::Joints(_) => 0.3,
+                    _ if task.is_angle(k) => 0.25,
+                    _ => 0.1,
+                };
+                Limits {
+                    position: [home[k] - reach, home[k] + reach],
+                    ..Limits::default()
+                }
+            })
+            .collect();
+        let tree = Tree::new(&robot);
+        let mut mechanism = Mechanism {
+            kind,
+            robot,
+            actuated,
+            task,
+            task_names,
+            workspace,
+            parameters,
+            home,
+            length,
+            warnings,
+            geometry,
+            tree,
+        };
+        mechanism.check_home()?;
+        Ok(mechanism)
+    }
+
+    /// Home must be reachable; a singular one is worth a warning.
+    fn check_home(&mut self) -> Result<()> {
+        if let Some(why) = self.problem(&self.home) {
+            return Err(Error::Infeasible(format!(
+                "{}: home cannot be reached: {why}",
+                self.robot.name
+            )));
+        }
+        let s = self.singularity(&self.home)?;
+        let warnings = s.warnings(&self.robot.name, "at home");
+        self.warnings.extend(warnings);
+        Ok(())
+    }
+
+    /// Number of actuators: rows of the regressor a sample.
+    pub fn actuators(&self) -> usize {
+        self.actuated.len()
+    }
+
+    /// Number of task coordinates.
+    pub fn freedoms(&self) -> usize {
+        self.task.count()
+    }
+
+    /// The tree, as the kernels read it.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// The kinematics.
+    pub fn geometry(&self) -> &dyn Geometry {
+        self.geometry.as_ref()
+    }
+
+    /// Names of the actuators.
+    pub fn actuator_names(&self) -> Vec<String> {
+        self.actuated
+            .iter()
+            .map(|&a| self.robot.joints[a].name.clone())
+            .collect()
+    }
+
+    /// Why a pose cannot be taken at all, with the number that shows it; `None` where it can.
+    /// Limits of joints are not looked at.
+    pub fn problem(&self, x: &[f64]) -> Option<String> {
+        if x.len() != self.freedoms() || x.iter().any(|v| !v.is_finite()) {
+            return Some(format!(
+                "{x:?} is not a pose of {} numbers",
+                self.freedoms()
+            ));
+        }
+        self.task
+            .unwritable(x)
+            .or_else(|| self.geometry.unreachable(x))
+    }
+
+    /// All tree coordinates of a pose.
+    ///
+    /// # Errors
+    /// A pose that cannot be reached, with the reason.
+    pub fn inverse(&self, x: &[f64]) -> Result<Vec<f64>> {
+        let samples = Samples {
+            dof: self.freedoms(),
+            count: 1,
+            q: x.to_vec(),
+            qd: vec![0.0; x.len()],
+            qdd: vec![0.0; x.len()],
+        };
+        Ok(self.motion(&samples)?.tree.q)
+    }
+
+    /// Positions of the actuators in a pose.
+    ///
+    /// # Errors
+    /// As [`Mechanism::inverse`].
+    pub fn actuator_positions(&self, x: &[f64]) -> Result<Vec<f64>> {
+        let q = self.inverse(x)?;
+        Ok(self.actuated.iter().map(|&a| q[a]).collect())
+    }
+
+    /// The same mechanism with a workspace box around home: half widths of the task coordinates.
+    ///
+    /// # Panics
+    /// If there is not one for each task coordinate.
+    pub fn with_workspace(mut self, half: &[f64]) -> Self {
+        assert_eq!(half.len(), self.freedoms(), "one for each task coordinate");
+        for (k, w) in self.workspace.iter_mut().enumerate() {
+            w.position = [self.home[k] - half[k], self.home[k] + half[k]];
+        }
+        self
+    }
+}
+
+/// Joints that serve as task coordinates: the first `n` actuators.
+fn geometry_joint_names(robot: &Robot, actuated: &[usize], n: usize) -> Vec<String> {
+    actuated
+        .iter()
+        .take(n)
+        .map(|&a| robot.joints[a].name.clone())
+        .collect()
+}

@@ -1,0 +1,485 @@
+//! Identities of closed chains on random geometry: regressor and inverse dynamics, power balance,
+//! gradients, forward after inverse kinematics, singular layouts, and what is said of bad input.
+
+mod common;
+
+use common::parallel::{delta, h4, hexapod, reference};
+use excite::dynamics::{Isa, Samples, Workspace};
+use excite::mechanism::gough_stewart::{Bodies, GoughStewart};
+use excite::mechanism::h4::{H4, Model};
+use excite::mechanism::parallelogram::motor_frame;
+use excite::mechanism::{ClosedMotion, ClosedWorkspace, Mechanism, TaskDerivatives};
+use excite::robot::{Body, JointTerm};
+use nalgebra::{Matrix3, Vector3};
+use rand::Rng;
+
+fn random_hexapod(seed: u64) -> GoughStewart {
+    let r = &mut common::rng(seed);
+    let mut robot = hexapod(&reference("sg").0);
+    for leg in &mut robot.legs {
+        leg.base += common::vector(r, 0.05);
+        leg.platform += common::vector(r, 0.05);
+        leg.rotation *= nalgebra::Rotation3::from_scaled_axis(common::vector(r, 0.1)).matrix();
+        leg.zero = r.random_range(0.2..0.4);
+        leg.terms = [r.random_range(1.0..3.0), 40.0, 5.0, -2.0];
+        for body in [&mut leg.cross, &mut leg.cylinder, &mut leg.rod] {
+            *body = common::inertia(r);
+        }
+    }
+    robot.platform = common::inertia(r);
+    robot.gravity = Vector3::new(0.5, -1.0, -9.6);
+    robot.bodies = Bodies::Cross;
+    robot.identify = JointTerm::ALL.to_vec();
+    robot
+}
+
+fn random_h4(seed: u64) -> H4 {
+    let r = &mut common::rng(seed);
+    let mut robot = h4(&reference("h4").0);
+    for chain in &mut robot.chains {
+        chain.motor += common::vector(r, 0.01);
+        chain.rotation *= nalgebra::Rotation3::from_scaled_axis(common::vector(r, 0.05)).matrix();
+        chain.arm_length += r.random_range(-0.01..0.01);
+        chain.zero = r.random_range(-0.2..0.2);
+        chain.terms = [0.02, 0.3, 0.1, 0.05];
+        chain.arm = common::inertia(r);
+        chain.rods = [common::inertia(r), common::inertia(r)];
+    }
+    robot.identify = JointTerm::ALL.to_vec();
+    robot
+}
+
+/// All kinds, with random geometry and inertia.
+fn mechanisms() -> Vec<Mechanism> {
+    let mut all: Vec<Mechanism> = (1..3).map(|s| random_hexapod(s).build().unwrap()).collect();
+    all.push(random_h4(3).build().unwrap());
+    all.push(delta(&reference("delta").0).build().unwrap());
+    all.push(common::tripod::build(3, 4).unwrap());
+    all.push(common::tripod::build(4, 5).unwrap());
+    let mut shared = random_hexapod(6);
+    shared.identical = true;
+    shared.axisymmetric = true;
+    shared.bodies = Bodies::Legs;
+    all.push(shared.build().unwrap());
+    shared.spherical = true;
+    all.push(shared.build().unwrap());
+    let mut lumped = h4(&reference("h4").0);
+    lumped.model = Model::LumpedGravity;
+    all.push(lumped.build().unwrap());
+    for m in &mut all {
+        let half: Vec<f64> = (0..m.freedoms())
+            .map(|k| if m.task.is_angle(k) { 0.2 } else { 0.05 })
+            .collect();
+        for (k, w) in m.workspace.iter_mut().enumerate() {
+            w.position = [m.home[k] - half[k], m.home[k] + half[k]];
+        }
+    }
+    all
+}
+
+fn motion(m: &Mechanism, count: usize, seed: u64) -> Samples {
+    let r = &mut common::rng(seed);
+    let mut x = Samples::zeros(m.freedoms(), count);
+    for k in 0..m.freedoms() {
+        let [low, high] = m.workspace[k].position;
+        for s in 0..count {
+            x.q[k * count + s] = r.random_range(low..high);
+            x.qd[k * count + s] = r.random_range(-1.0..1.0);
+            x.qdd[k * count + s] = r.random_range(-5.0..5.0);
+        }
+    }
+    x
+}
+
+#[test]
+fn regressor_times_parameters_is_inverse_dynamics() {
+    for (i, m) in mechanisms().iter().enumerate() {
+        let x = motion(m, 300, i as u64);
+        let w = m.regressor(&x).unwrap();
+        let phi = m.parameters.values();
+        let tau = m.torque(&x, &phi).unwrap();
+        let mut nominal = m.nominal_torque(&x).unwrap();
+        // bodies and terms that are not unknowns are in the nominal torque alone
+        let known = m.torque(&x, &vec![0.0; phi.len()]).unwrap();
+        let mut worst = 0.0f64;
+        for row in 0..w.nrows() {
+            let sum: f64 = (0..phi.len()).map(|c| w[(row, c)] * phi[c]).sum();
+            let size: f64 = (0..phi.len()).map(|c| (w[(row, c)] * phi[c]).abs()).sum();
+            worst = worst.max((sum - (tau[row] - known[row])).abs() / (1.0 + size));
+        }
+        println!("{} {i}: {worst:.1e}", m.kind);
+        assert!(worst < 1e-13, "{} {i}: {worst:e}", m.kind);
+        if m.kind == "gough-stewart" && m.parameters.plain || m.kind == "tripod" {
+            nominal.iter_mut().zip(&tau).for_each(|(a, b)| *a -= b);
+            assert!(nominal.iter().all(|d| d.abs() < 1e-9));
+        }
+    }
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_bits() {
+    let m = random_hexapod(1).build().unwrap();
+    let x = motion(&m, 77, 9);
+    let mut first: Option<(ClosedMotion, Vec<f64>)> = None;
+    for isa in Isa::available() {
+        let mut closed = ClosedMotion::default();
+        m.motion_into(isa, &x, &mut closed).unwrap();
+        let rows = 6 * x.count;
+        let mut w = vec![0.0; rows * m.parameters.raw_count()];
+        m.raw_regressor(
+            &mut Workspace::with_isa(isa),
+            &closed,
+            &mut w,
+            rows,
+            x.count,
+        );
+        match &first {
+            None => first = Some((closed, w)),
+            Some((c, y)) => {
+                assert_eq!(c.tree, closed.tree, "{isa:?}");
+                assert_eq!(c.g, closed.g, "{isa:?}");
+                assert_eq!(*y, w, "{isa:?}");
+            }
+        }
+    }
+}
+
+/// `q, q̇, q̈, D` from each other by differences along a path.
+#[test]
+fn velocities_accelerations_and_jacobian_are_derivatives_of_positions() {
+    for m in mechanisms() {
+        let x = motion(&m, 1, 11);
+        let at = |s: f64| {
+            let p: Vec<f64> = (0..x.dof)
+                .map(|k| x.q[k] + x.qd[k] * s + 0.5 * x.qdd[k] * s * s)
+                .collect();
+            m.inverse(&p).unwrap()
+        };
+        let closed = m.motion(&x).unwrap();
+        let h = 1e-4;
+        let (a, b, c) = (at(-h), at(0.0), at(h));
+        for i in 0..m.robot.dof() {
+            let v = (c[i] - a[i]) / (2.0 * h);
+            let w = (c[i] - 2.0 * b[i] + a[i]) / (h * h);
+            assert!(
+                (closed.tree.qd[i] - v).abs() < 1e-5 * (1.0 + v.abs()),
+                "{} {i}",
+                m.kind
+            );
+            assert!(
+                (closed.tree.qdd[i] - w).abs() < 1e-4 * (1.0 + w.abs()),
+                "{} {i}",
+                m.kind
+            );
+            for k in 0..x.dof {
+                let step = |h: f64| {
+                    let mut p = x.q.clone();
+                    p[k] += h;
+                    m.inverse(&p).unwrap()[i]
+                };
+                let d = (step(1e-6) - step(-1e-6)) / 2e-6;
+                assert!((closed.d[i * x.dof + k] - d).abs() < 1e-7 * (1.0 + d.abs()));
+            }
+        }
+    }
+}
+
+/// The tree closes: rods and legs end where the platform has their joints.
+#[test]
+fn chains_end_on_the_platform() {
+    let robot = random_hexapod(2);
+    let m = robot
+        .build()
+        .unwrap()
+        .with_workspace(&[0.1, 0.1, 0.1, 0.3, 0.3, 0.3]);
+    let x = motion(&m, 1, 5);
+    let poses = common::poses(&m.robot, &m.inverse(&x.q).unwrap());
+    let find = |name: &str| m.robot.bodies.iter().position(|b| b.name == name).unwrap();
+    let (r, p) = poses[find("platform")];
+    for (i, leg) in robot.legs.iter().enumerate() {
+        let tip = poses[find(&format!("rod{}", i + 1))].1;
+        assert!((tip - (p + r * leg.platform)).norm() < 1e-14);
+    }
+    let robot = random_h4(3);
+    let m = robot
+        .build()
+        .unwrap()
+        .with_workspace(&[0.05, 0.05, 0.05, 0.4]);
+    let x = motion(&m, 1, 6);
+    let poses = common::poses(&m.robot, &m.inverse(&x.q).unwrap());
+    let find = |name: &str| m.robot.bodies.iter().position(|b| b.name == name).unwrap();
+    for (i, chain) in robot.chains.iter().enumerate() {
+        let (bar, at) = poses[find(&format!("bar{}", chain.hinge + 1))];
+        assert!(
+            (bar - Matrix3::identity()).norm() < 1e-14,
+            "bars keep their orientation"
+        );
+        for (rod, side) in [("a", 0.5), ("b", -0.5)] {
+            let (r, p) = poses[find(&format!("rod{}{rod}", i + 1))];
+            let end = p + r * Vector3::new(0.0, 0.0, chain.rod_length);
+            let joint = at + chain.attachment + chain.rotation.column(0) * (side * chain.width);
+            assert!((end - joint).norm() < 1e-13);
+        }
+    }
+}
+
+/// Energy of the tree along a path of the task coordinates, from poses alone.
+fn energy(m: &Mechanism, path: &dyn Fn(f64) -> Vec<f64>, s: f64) -> f64 {
+    let h = 1e-5;
+    let at = |s: f64| common::poses(&m.robot, &m.inverse(&path(s)).unwrap());
+    let (minus, here, plus) = (at(s - h), at(s), at(s + h));
+    let mut total = 0.0;
+    for (i, body) in m.robot.bodies.iter().enumerate() {
+        let Body { inertia, .. } = body;
+        let (r, p) = here[i];
+        let skew = r.transpose() * (plus[i].0 - minus[i].0) / (2.0 * h);
+        let w = Vector3::new(skew.m32, skew.m13, skew.m21);
+        let v = r.transpose() * (plus[i].1 - minus[i].1) / (2.0 * h);
+        let (mass, mc) = (inertia.mass(), inertia.first_moment());
+        total += 0.5 * mass * v.norm_squared()
+            + v.dot(&w.cross(&mc))
+            + 0.5 * w.dot(&(inertia.tensor() * w));
+        total -= m.robot.gravity.dot(&(p * mass + r * mc));
+    }
+    total
+}
+
+#[test]
+fn actuator_power_is_the_change_of_energy() {
+    for m in mechanisms() {
+        if m.kind == "h4" && m.parameters.list.len() < 20 {
+            continue; // the lumped model is no set of bodies
+        }
+        let x = motion(&m, 1, 21);
+        let path = |s: f64| -> Vec<f64> {
+            (0..x.dof)
+                .map(|k| x.q[k] + x.qd[k] * s + 0.5 * x.qdd[k] * s * s)
+                .collect()
+        };
+        let h = 1e-3;
+        let change = (energy(&m, &path, h) - energy(&m, &path, -h)) / (2.0 * h);
+        // rigid bodies alone
+        let closed = m.motion(&x).unwrap();
+        let phi: Vec<f64> = m.robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
+        let mut gamma = vec![0.0; m.robot.dof()];
+        m.tree()
+            .inverse_dynamics(&mut Workspace::default(), &phi, &closed.tree, &mut gamma);
+        let tau = m.project(&closed, &gamma);
+        let power: f64 = m
+            .actuated
+            .iter()
+            .zip(&tau)
+            .map(|(&a, t)| t * closed.tree.qd[a])
+            .sum();
+        assert!(
+            (power - change).abs() < 1e-3 * (1.0 + power.abs()),
+            "{}: {power} {change}",
+            m.kind
+        );
+    }
+}
+
+#[test]
+fn gradients_are_those_of_difference_quotients() {
+    for m in mechanisms() {
+        let (count, na, dof) = (3, m.actuators(), m.freedoms());
+        let x = motion(&m, count, 31);
+        let r = &mut common::rng(32);
+        let each = m.parameters.raw_count();
+        let raw: Vec<f64> = (0..2 * each).map(|_| r.random_range(-1.0..1.0)).collect();
+        let rates: Vec<f64> = (0..2 * na * count)
+            .map(|_| r.random_range(-1.0..1.0))
+            .collect();
+        let mut out = TaskDerivatives::default();
+        m.gradients(&mut ClosedWorkspace::default(), &raw, &x, &rates, &mut out)
+            .unwrap();
+        // Σ r τ of vector v at sample s, from the raw regressor
+        let value = |x: &Samples, v: usize, s: usize| -> f64 {
+            let closed = m.motion(x).unwrap();
+            let rows = na * count;
+            let mut w = vec![0.0; rows * each];
+            m.raw_regressor(&mut Workspace::default(), &closed, &mut w, rows, count);
+            (0..na)
+                .map(|a| {
+                    let tau: f64 = (0..each)
+                        .map(|c| w[c * rows + a * count + s] * raw[v * each + c])
+                        .sum();
+                    rates[(v * na + a) * count + s] * tau
+                })
+                .sum()
+        };
+        for v in 0..2 {
+            for (order, ours) in [&out.x, &out.xd, &out.xdd].iter().enumerate() {
+                for k in 0..dof {
+                    let s = 1;
+                    let h = 1e-5;
+                    let moved = |h: f64| {
+                        let mut y = x.clone();
+                        [&mut y.q, &mut y.qd, &mut y.qdd][order][k * count + s] += h;
+                        value(&y, v, s)
+                    };
+                    let quotient = (moved(h) - moved(-h)) / (2.0 * h);
+                    let g = ours[(v * dof + k) * count + s];
+                    let scale = 1.0 + quotient.abs() + value(&x, v, s).abs();
+                    assert!(
+                        (g - quotient).abs() < 2e-6 * scale,
+                        "{} order {order} k {k}: {g} {quotient}",
+                        m.kind
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn forward_after_inverse_is_the_identity() {
+    for m in mechanisms() {
+        let x = motion(&m, 20, 41);
+        for s in 0..20 {
+            let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * 20 + s]).collect();
+            let q = m.actuator_positions(&pose).unwrap();
+            let back = m.forward(&q, &m.home).unwrap();
+            assert!(back.residual < 1e-11 && back.iterations < 40);
+            for (a, b) in back.x.iter().zip(&pose) {
+                assert!((a - b).abs() < 1e-10, "{}: {:?} {pose:?}", m.kind, back.x);
+            }
+        }
+    }
+}
+
+#[test]
+fn forward_kinematics_stays_in_its_assembly_mode() {
+    let m = hexapod(&reference("sg").0).build().unwrap();
+    let sign = |x: &[f64]| m.actuation_jacobian(x).unwrap().determinant().signum();
+    // beyond the singularity at a yaw of a right angle the determinant has the other sign
+    let mut beyond = m.home.clone();
+    beyond[5] = 2.1;
+    assert_ne!(sign(&m.home), sign(&beyond));
+    let q = m.actuator_positions(&beyond).unwrap();
+    match m.forward(&q, &m.home) {
+        Ok(other) => {
+            assert_eq!(sign(&other.x), sign(&m.home));
+            assert!((other.x[5] - 2.1).abs() > 0.1);
+        }
+        Err(e) => assert!(e.to_string().contains("assembly mode"), "{e}"),
+    }
+    // from nearby it is found
+    let mut near = beyond.clone();
+    near[5] = 2.0;
+    assert!((m.forward(&q, &near).unwrap().x[5] - 2.1).abs() < 1e-10);
+    // lengths that cannot be
+    let mut long = m.actuator_positions(&m.home).unwrap();
+    long[0] += 3.0;
+    let e = m.forward(&long, &m.home).unwrap_err().to_string();
+    assert!(e.contains("no pose of this assembly mode"), "{e}");
+}
+
+/// An H4 with arms at these azimuths, two on each bar.
+fn layout(azimuths: [f64; 4], hinges: [[f64; 2]; 2]) -> Mechanism {
+    let mut robot = h4(&reference("h4").0);
+    for (i, chain) in robot.chains.iter_mut().enumerate() {
+        let azimuth: f64 = azimuths[i].to_radians();
+        let out = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0);
+        chain.hinge = i / 2;
+        let hinge = Vector3::new(hinges[i / 2][0], hinges[i / 2][1], 0.0);
+        chain.motor = out * 0.14
+            + if azimuths[i] == 270.0 {
+                hinge
+            } else {
+                Vector3::zeros()
+            };
+        chain.rotation = motor_frame(azimuth);
+        chain.attachment = out * 0.05;
+    }
+    robot.hinges = hinges.map(|h| Vector3::new(h[0], h[1], 0.0));
+    robot.build().unwrap()
+}
+
+#[test]
+fn singular_layouts_of_the_h4_are_seen_and_the_regular_one_is_not() {
+    let across = [[0.06, 0.0], [-0.06, 0.0]];
+    let actuation = layout([0.0, 180.0, 90.0, 270.0], across);
+    let s = actuation.singularity(&actuation.home).unwrap();
+    println!("0/180|90/270: {s:?}");
+    assert!(s.actuation.is_singular() && s.actuation.condition() > 1e6);
+    assert!(
+        actuation
+            .warnings
+            .iter()
+            .any(|w| w.message.contains("actuation Jacobian"))
+    );
+
+    let inner = layout([45.0, 135.0, 225.0, 315.0], [[0.0, 0.06], [0.0, -0.06]]);
+    let s = inner.singularity(&inner.home).unwrap();
+    println!("45/135|225/315: {s:?}");
+    assert!(!s.actuation.is_singular());
+    assert!(s.constraint.unwrap().is_singular());
+    assert!(
+        inner
+            .warnings
+            .iter()
+            .any(|w| w.message.contains("constraint block"))
+    );
+
+    let regular = layout([0.0, 270.0, 180.0, 270.0], across);
+    let s = regular.singularity(&regular.home).unwrap();
+    println!("0/270|180/270: {s:?}");
+    assert!(
+        !s.is_singular() && regular.warnings.is_empty(),
+        "{:?}",
+        regular.warnings
+    );
+}
+
+#[test]
+fn hexapod_is_singular_at_a_yaw_of_a_right_angle() {
+    // similar hexagons, aligned: Fichter's configuration
+    let mut robot = hexapod(&reference("sg").0);
+    for (i, leg) in robot.legs.iter_mut().enumerate() {
+        let angle = (i / 2) as f64 * 2.0944 + if i % 2 == 0 { -0.3 } else { 0.3 };
+        let at = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        (leg.base, leg.platform) = (at * 0.6, at * 0.35);
+    }
+    robot.home[5] = std::f64::consts::FRAC_PI_2;
+    let m = robot.build().unwrap();
+    assert!(
+        m.warnings
+            .iter()
+            .any(|w| w.message.contains("singular at home")),
+        "{:?}",
+        m.warnings
+    );
+}
+
+#[test]
+fn bad_mechanisms_are_refused_with_the_number_that_shows_it() {
+    let said = |e: excite::Result<Mechanism>| e.unwrap_err().to_string();
+    let mut five = hexapod(&reference("sg").0);
+    five.legs.pop();
+    assert!(said(five.build()).contains("this one has 5"));
+    let mut sps = hexapod(&reference("sg").0);
+    sps.spherical = true;
+    assert!(said(sps.build()).contains("axisymmetric"));
+    let mut far = delta(&reference("delta").0);
+    far.home[2] = -0.9;
+    let e = said(far.build());
+    assert!(e.contains("does not reach") && e.contains("0.9"), "{e}");
+    let m = delta(&reference("delta").0).build().unwrap();
+    let e = m.inverse(&[0.0, 0.0, -1.5]).unwrap_err().to_string();
+    assert!(e.contains("chain 1 does not reach"), "{e}");
+    let four = common::tripod::build(4, 1).unwrap();
+    assert!(
+        four.warnings
+            .iter()
+            .any(|w| w.message.contains("4 actuators for 3 freedoms"))
+    );
+    let e = common::tripod::build(2, 1).unwrap_err().to_string();
+    assert!(e.contains("3 freedoms but 2 actuated"), "{e}");
+    let m = hexapod(&reference("sg").0).build().unwrap();
+    let e = m
+        .inverse(&[0.0, 0.0, 0.9, 0.0, 1.56, 0.0])
+        .unwrap_err()
+        .to_string();
+    assert!(e.contains("pitch is 1.560"), "{e}");
+}
