@@ -1,4 +1,4 @@
-//! Time of the closed-chain regressor, one core: `cargo run --release --example parallel_speed`.
+//! Time of the closed-chain regressor, one core: `cargo bench --bench hexapod`.
 
 use excite::dynamics::{Samples, Workspace};
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart, Leg, joint_frame};
