@@ -32,6 +32,7 @@
 //! |---|---|---|
 //! | robot | [`robot`] | bodies, joints, limits, the ten inertial parameters |
 //! | dynamics | [`dynamics`], [`regressor`] | `τ`, `Y`, `W` and exact derivatives, in batches |
+//! | parallel | [`mechanism`] | closed chains: kinematics, `τ`, `Y`, singularities |
 //! | base | [`base`] | base parameters, rank, what cannot be identified and why |
 //! | trajectory | [`trajectory`] | Fourier series, exact extrema, certificates, files |
 //! | design | [`design`] | the optimiser |

@@ -1,6 +1,6 @@
 //! Delta robot: three chains of arm and parallelogram to a platform that only translates
 //! (Clavel 1988). Every rod is a body: 10 bodies, 100 columns. See
-//! [`parallelogram`](super::parallelogram) for the chain.
+//! [`parallelogram`] for the chain.
 
 use super::geometry::{Closed, Kinematics};
 use super::parallelogram::{self, Bodies, Chain, Parallelograms};

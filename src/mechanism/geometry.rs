@@ -4,7 +4,7 @@
 //! *positions*, from the task coordinates `x` to all tree coordinates `q = F(x)`, generic over
 //! [`Scalar`]. [`Closed`] turns that into a [`Geometry`]: motions, Jacobians and curvatures of
 //! batches, exact and in packs of samples. Mechanisms without closed form
-//! ([`loops`](super::loops)) implement [`Geometry`] themselves.
+//! implement [`Geometry`] themselves.
 //!
 //! With `D = ∂F/∂x`:
 //!

@@ -14,6 +14,10 @@
 //! [`Kinematics`] and the tree it puts together with [`tree::Builder`]; see
 //! [`gough_stewart`] for an example.
 
+// written with indices, as in the kernels: iterators over arrays of wide packs are not inlined into
+// the functions that are compiled for them
+#![allow(clippy::needless_range_loop)]
+
 pub mod delta;
 mod dynamics;
 mod forward;

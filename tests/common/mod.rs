@@ -1,5 +1,5 @@
 //! Random robots and motions for the identity tests.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::needless_range_loop)]
 
 pub mod parallel;
 pub mod tripod;
