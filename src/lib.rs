@@ -57,6 +57,7 @@ pub mod conic;
 pub mod design;
 pub mod dynamics;
 pub mod error;
+pub mod estimate;
 pub mod identifiability;
 pub mod log;
 pub mod mechanism;
