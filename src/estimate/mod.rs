@@ -14,8 +14,10 @@
 
 pub mod consistent;
 pub mod essential;
+pub mod json;
 pub mod linear;
 pub mod lmi;
+pub mod robot;
 pub mod stack;
 pub mod uncertainty;
 pub mod validation;
@@ -83,8 +85,12 @@ pub struct Settings {
 pub struct Trial {
     /// strength `γ`
     pub strength: f64,
-    /// mean squared weighted residual on the parts that were left out
+    /// squared weighted residual on the parts that were left out, mean over the parts
     pub error: f64,
+    /// how much it is larger than that of the best strength
+    pub worse: f64,
+    /// standard error of that difference over the parts
+    pub chance: f64,
 }
 
 /// What identification came to.
@@ -166,6 +172,17 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
                 .into(),
         ));
     }
+    // all records through the same filter
+    let mut settings = settings.clone();
+    settings.signals.cutoff.get_or_insert_with(|| {
+        signals::common_cutoff(
+            records
+                .iter()
+                .copied()
+                .filter(|r| r.purpose == Purpose::Fit),
+        )
+    });
+    let settings = &settings;
     let base = plant.base()?;
     warnings.extend(base.warnings.iter().cloned());
     let prepared = records
@@ -248,12 +265,9 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         None if free => 1e-2,
         None => {
             trials = cross_validate(&folds, &prior, &projection, inflation)?;
-            let best = trials.iter().map(|t| t.error).fold(f64::INFINITY, f64::min);
-            // the strongest prior that is as good as the best to half a percent
             trials
                 .iter()
-                .rev()
-                .find(|t| t.error <= 1.005 * best)
+                .min_by(|a, b| a.error.total_cmp(&b.error))
                 .map_or(1.0, |t| t.strength)
         }
     };
@@ -281,6 +295,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         &base,
         &records,
         &stacks,
+        &prepared,
         settings,
         &pi,
         &pi_consistent,
@@ -489,12 +504,26 @@ fn cross_validate(
             Ok(out)
         })
         .collect::<Result<_>>()?;
+    let parts = folds.len() as f64;
+    let mean = |k: usize| errors.iter().map(|e| e[k]).sum::<f64>() / parts;
+    let best = (0..STRENGTHS.len())
+        .min_by(|&a, &b| mean(a).total_cmp(&mean(b)))
+        .unwrap_or(0);
     Ok(STRENGTHS
         .iter()
         .enumerate()
-        .map(|(k, &strength)| Trial {
-            strength,
-            error: errors.iter().map(|e| e[k]).sum::<f64>() / folds.len() as f64,
+        .map(|(k, &strength)| {
+            let worse = mean(k) - mean(best);
+            let spread: f64 = errors
+                .iter()
+                .map(|e| (e[k] - e[best] - worse).powi(2))
+                .sum();
+            Trial {
+                strength,
+                error: mean(k),
+                worse,
+                chance: (spread / (parts * (parts - 1.0))).sqrt(),
+            }
         })
         .collect())
 }
