@@ -18,8 +18,10 @@
 // the functions that are compiled for them
 #![allow(clippy::needless_range_loop)]
 
+pub mod bundled;
 pub mod delta;
 mod dynamics;
+pub mod file;
 mod forward;
 pub mod geometry;
 pub mod gough_stewart;
