@@ -26,6 +26,7 @@ mod forward;
 pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
+mod motion_file;
 pub mod parallelogram;
 pub mod parameters;
 pub mod scalar;
