@@ -18,15 +18,21 @@
 // the functions that are compiled for them
 #![allow(clippy::needless_range_loop)]
 
+pub mod bundled;
 mod certificate;
 pub mod delta;
 mod dynamics;
+pub mod file;
 mod forward;
 pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
+<<<<<<< HEAD
 pub mod interval;
 pub mod margins;
+=======
+mod motion_file;
+>>>>>>> parallel
 pub mod parallelogram;
 pub mod parameters;
 pub mod scalar;
