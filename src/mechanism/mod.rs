@@ -27,12 +27,9 @@ mod forward;
 pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
-<<<<<<< HEAD
 pub mod interval;
 pub mod margins;
-=======
 mod motion_file;
->>>>>>> parallel
 pub mod parallelogram;
 pub mod parameters;
 pub mod scalar;
