@@ -50,7 +50,7 @@ pub use task::{PlatformMotion, Task};
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
-use crate::robot::{Joint, Limits, Motion, Robot};
+use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
 
 /// What a mechanism is put together from.
 #[derive(Debug)]
@@ -323,6 +323,15 @@ impl Mechanism {
             path: self.robot.path.clone(),
             hash: self.robot.hash.clone(),
         }
+    }
+
+    /// The same mechanism with other terms of its actuators as unknowns.
+    pub fn with_terms(mut self, terms: &[JointTerm]) -> Self {
+        for &a in &self.actuated {
+            self.robot.joints[a].identify = JointTerm::ALL.map(|t| terms.contains(&t));
+        }
+        self.parameters.set_terms(&self.robot);
+        self
     }
 
     /// The same mechanism with a workspace box around home: half widths of the task coordinates.
