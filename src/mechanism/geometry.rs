@@ -150,14 +150,14 @@ unsafe fn sweep<L: Lanes, P: Pass>(pass: &P, from: usize, to: usize) -> usize {
     s
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 #[target_feature(enable = "avx2")]
 unsafe fn sweep_avx2<P: Pass>(pass: &P, from: usize, to: usize) -> usize {
     // SAFETY: the caller made sure of AVX2
     unsafe { sweep::<lanes::Avx2, P>(pass, from, to) }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 #[target_feature(enable = "avx512f,avx512dq")]
 unsafe fn sweep_avx512<P: Pass>(pass: &P, from: usize, to: usize) -> usize {
     // SAFETY: the caller made sure of AVX-512
@@ -178,9 +178,9 @@ pub(crate) unsafe fn run<P: Pass>(isa: Isa, pass: &P, count: usize) {
         let done = match isa {
             Isa::Scalar => 0,
             Isa::Portable => sweep::<Portable4, P>(pass, 0, count),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx2 => sweep_avx2(pass, 0, count),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx512 => {
                 let done = sweep_avx512(pass, 0, count);
                 done + if count - done >= 4 {
