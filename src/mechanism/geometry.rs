@@ -14,7 +14,9 @@
 
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
-use crate::dynamics::lanes::{self, Isa, Lanes, Portable4};
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
+use crate::dynamics::lanes;
+use crate::dynamics::lanes::{Isa, Lanes, Portable4};
 use nalgebra::{DMatrix, Vector3};
 
 /// Takes the tree coordinates one by one, in any order.
