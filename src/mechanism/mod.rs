@@ -26,6 +26,7 @@ mod forward;
 pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
+pub mod loops;
 mod motion_file;
 pub mod parallelogram;
 pub mod parameters;
@@ -144,7 +145,10 @@ impl Mechanism {
             )));
         }
         let task_names: Vec<String> = match task {
-            Task::Joints(_) => geometry_joint_names(&robot, &actuated, freedoms),
+            Task::Joints(_) => match geometry.task_joints() {
+                Some(joints) => geometry_joint_names(&robot, joints, freedoms),
+                None => geometry_joint_names(&robot, &actuated, freedoms),
+            },
             _ => task.names().iter().map(|n| n.to_string()).collect(),
         };
         let (parameters, mut warnings) = Parameters::new(&mut robot, &groups);
@@ -283,7 +287,7 @@ impl Mechanism {
     }
 }
 
-/// Joints that serve as task coordinates: the first `n` actuators.
+/// Names of the joints that serve as task coordinates: the first `n` of these.
 fn geometry_joint_names(robot: &Robot, actuated: &[usize], n: usize) -> Vec<String> {
     actuated
         .iter()

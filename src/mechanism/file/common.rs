@@ -210,7 +210,7 @@ impl Head<'_> {
     }
 
     /// What `[actuator]` says of every actuator.
-    fn shared(&self, joint: &mut Joint, warnings: &mut Vec<Warning>) -> Result<()> {
+    pub(super) fn shared(&self, joint: &mut Joint, warnings: &mut Vec<Warning>) -> Result<()> {
         let Some(entry) = self.actuator else {
             return Ok(());
         };
