@@ -123,6 +123,12 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
         None
     }
 
+    /// Where the task coordinates are joints: which of the tree coordinates they are. `None`: the
+    /// first actuators.
+    fn task_joints(&self) -> Option<&[usize]> {
+        None
+    }
+
     /// Whether each sample starts from the solution of the one before, so that a batch must not be
     /// cut into pieces.
     fn sequential(&self) -> bool {
