@@ -63,9 +63,24 @@ impl Plant {
     /// Reads a robot: the path of a `robot.toml` or `.urdf`, or the name of a bundled one.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// As [`Mechanism::load`] and [`Robot::load`].
     pub fn load(spec: &str) -> Result<Self> {
-        Ok(Plant::Serial(Robot::load(spec)?))
+        match Mechanism::load(spec)? {
+            Some(mechanism) => Ok(Plant::Parallel(Box::new(mechanism))),
+            None => Ok(Plant::Serial(Robot::load(spec)?)),
+        }
+    }
+
+    /// The same robot with other joint columns in the regressor, the same for every actuator (every
+    /// joint of a tree).
+    ///
+    /// # Errors
+    /// A mechanism that cannot be put together again.
+    pub fn with_terms(self, terms: &[JointTerm]) -> Result<Self> {
+        Ok(match self {
+            Plant::Serial(robot) => Plant::Serial(robot.with_terms(terms)),
+            Plant::Parallel(mechanism) => Plant::Parallel(Box::new(mechanism.with_terms(terms))),
+        })
     }
 
     /// The bodies and joints: of a parallel robot its tree, passive joints included.
@@ -114,6 +129,15 @@ impl Plant {
     pub fn actuators(&self) -> Vec<&Joint> {
         let joints = &self.robot().joints;
         self.actuated().into_iter().map(|a| &joints[a]).collect()
+    }
+
+    /// What a trajectory moves: the robot itself, or the task coordinates of a parallel robot as the
+    /// joints of a robot without bodies.
+    pub fn moved(&self) -> Robot {
+        match self {
+            Plant::Serial(robot) => robot.clone(),
+            Plant::Parallel(mechanism) => mechanism.task_robot(),
+        }
     }
 
     /// Names of the coordinates `x`.
