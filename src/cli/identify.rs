@@ -68,12 +68,22 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let files = ["model.json", "robot.urdf", "robot.xml", "robot.toml", "report.json", "report.html"];
+    let files = [
+        "model.json",
+        "robot.urdf",
+        "robot.xml",
+        "robot.toml",
+        "report.json",
+        "report.html",
+    ];
     let mut experiment = Experiment::read(&args.experiment)?;
     let mut notes = Vec::new();
     experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
     let serial = experiment.plant.mechanism().is_none();
-    let wanted: Vec<&str> = files.into_iter().filter(|f| serial || !matches!(*f, "robot.toml" | "robot.xml")).collect();
+    let wanted: Vec<&str> = files
+        .into_iter()
+        .filter(|f| serial || !matches!(*f, "robot.toml" | "robot.xml"))
+        .collect();
     let mut settings = Settings {
         method: match args.method.as_str() {
             "ols" => Method::Ols,
@@ -95,7 +105,12 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.average = !args.no_average;
     settings.signals.measured_rates = !args.derive;
     let paths = prepare_dir(&args.output, &wanted, args.force)?;
-    let path = |name: &str| wanted.iter().position(|f| *f == name).map(|k| paths[k].clone());
+    let path = |name: &str| {
+        wanted
+            .iter()
+            .position(|f| *f == name)
+            .map(|k| paths[k].clone())
+    };
 
     let plant = &experiment.plant;
     let mut id = identify(plant, &experiment.records, &settings)?;
@@ -103,7 +118,13 @@ pub fn run(args: Args) -> Result<()> {
     warn(&id.warnings);
     let (_, verdict) = after::verdict(plant, &id);
     let robot = robot::with_values(plant, &id.phi);
-    let report = json::report(plant, &id, &settings, &verdict, begin.elapsed().as_secs_f64());
+    let report = json::report(
+        plant,
+        &id,
+        &settings,
+        &verdict,
+        begin.elapsed().as_secs_f64(),
+    );
     let mut texts = vec![
         ("model.json", pretty(&json::model(plant, &id))),
         ("robot.urdf", robot::urdf(&robot)),
@@ -121,14 +142,23 @@ pub fn run(args: Args) -> Result<()> {
     }
     match args.json {
         true => print(&pretty(&report)),
-        false => print(&summary(&id, &verdict, &paths, begin.elapsed().as_secs_f64())),
+        false => print(&summary(
+            &id,
+            &verdict,
+            &paths,
+            begin.elapsed().as_secs_f64(),
+        )),
     }
 }
 
 /// The joint columns: those asked for, those of the file, or the usual ones where it lists none.
 fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> Result<Plant> {
     let mut terms = Vec::new();
-    for name in asked.unwrap_or_default().iter().filter(|n| n.as_str() != "none") {
+    for name in asked
+        .unwrap_or_default()
+        .iter()
+        .filter(|n| n.as_str() != "none")
+    {
         match JointTerm::ALL.into_iter().find(|t| t.name() == name) {
             Some(t) => terms.push(t),
             None => {
@@ -186,7 +216,11 @@ fn summary(id: &Identification, verdict: &str, files: &[PathBuf], seconds: f64) 
     out += &pair("nominal", v.nominal.0, v.nominal.1);
     out += &pair("least squares alone", v.plain.0, v.plain.1);
     out += &pair("essential parameters alone", v.essential.0, v.essential.1);
-    out += &pair("this model", v.fit.relative_error, v.holdout.as_ref().map(|h| h.relative_error));
+    out += &pair(
+        "this model",
+        v.fit.relative_error,
+        v.holdout.as_ref().map(|h| h.relative_error),
+    );
     let _ = writeln!(
         out,
         "{} base parameters, {} essential; condition number {:.1}; prior strength {}",

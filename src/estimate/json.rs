@@ -76,10 +76,14 @@ fn records(id: &Identification) -> Vec<Value> {
 }
 
 /// `report.json`.
-pub fn report(plant: &Plant, id: &Identification, settings: &Settings, verdict: &str, seconds: f64) -> Value {
-    let pair = |(fit, holdout): (f64, Option<f64>)| {
-        json!({ "fit": number(fit), "holdout": holdout.map(number) })
-    };
+pub fn report(
+    plant: &Plant,
+    id: &Identification,
+    settings: &Settings,
+    verdict: &str,
+    seconds: f64,
+) -> Value {
+    let pair = |(fit, holdout): (f64, Option<f64>)| json!({ "fit": number(fit), "holdout": holdout.map(number) });
     let v = &id.validation;
     let mut validation = json!({ "fit": v.fit });
     if let Some(h) = &v.holdout {
@@ -90,7 +94,9 @@ pub fn report(plant: &Plant, id: &Identification, settings: &Settings, verdict: 
         .flat_map(|i| (0..i).map(move |j| (i, j)))
         .filter_map(|(i, j)| {
             let r = id.covariance[(i, j)] / (id.std[i] * id.std[j]);
-            (r.abs() > 0.9).then(|| json!({ "parameters": [id.base.name(i), id.base.name(j)], "correlation": r }))
+            (r.abs() > 0.9).then(
+                || json!({ "parameters": [id.base.name(i), id.base.name(j)], "correlation": r }),
+            )
         })
         .collect();
     json!({

@@ -43,7 +43,9 @@ pub fn with_values(plant: &Plant, phi: &[f64]) -> Robot {
 
 /// Text that may stand in an XML attribute.
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('"', "&quot;")
 }
 
 /// Roll, pitch and yaw of a rotation.
@@ -75,7 +77,16 @@ pub fn urdf(robot: &Robot) -> String {
                 out,
                 "    <inertial>\n      <origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
                  <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>\n    </inertial>",
-                c.x, c.y, c.z, body.inertia.mass(), i.m11, i.m12, i.m13, i.m22, i.m23, i.m33
+                c.x,
+                c.y,
+                c.z,
+                body.inertia.mass(),
+                i.m11,
+                i.m12,
+                i.m13,
+                i.m22,
+                i.m23,
+                i.m33
             );
         }
         out.push_str("  </link>\n");
@@ -94,12 +105,23 @@ pub fn urdf(robot: &Robot) -> String {
             out,
             "  <joint name=\"{}\" type=\"{kind}\">\n    <origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>\n    \
              <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    <axis xyz=\"{} {} {}\"/>",
-            escape(&body.joint_name), p.x, p.y, p.z, escape(parent), escape(&body.name),
-            body.axis.x, body.axis.y, body.axis.z
+            escape(&body.joint_name),
+            p.x,
+            p.y,
+            p.z,
+            escape(parent),
+            escape(&body.name),
+            body.axis.x,
+            body.axis.y,
+            body.axis.z
         );
         let mut limit = String::new();
         if bounded {
-            let _ = write!(limit, " lower=\"{}\" upper=\"{}\"", limits.position[0], limits.position[1]);
+            let _ = write!(
+                limit,
+                " lower=\"{}\" upper=\"{}\"",
+                limits.position[0], limits.position[1]
+            );
         }
         for (name, x) in [("velocity", limits.velocity), ("effort", limits.effort)] {
             if x.is_finite() {
@@ -120,7 +142,9 @@ pub fn urdf(robot: &Robot) -> String {
             let _ = writeln!(
                 out,
                 "    <mimic joint=\"{}\" multiplier=\"{}\" offset=\"{}\"/>",
-                escape(&joint.name), body.ratio, body.offset
+                escape(&joint.name),
+                body.ratio,
+                body.offset
             );
         }
         out.push_str("  </joint>\n");
@@ -137,7 +161,10 @@ pub fn mujoco(robot: &Robot) -> String {
         out,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  <option gravity=\"{} {} {}\"/>\n  \
          <worldbody>",
-        escape(&robot.name), g.x, g.y, g.z
+        escape(&robot.name),
+        g.x,
+        g.y,
+        g.z
     );
     for b in (0..robot.bodies.len()).filter(|&b| robot.bodies[b].parent.is_none()) {
         mujoco_body(robot, b, 2, &mut out);
@@ -154,7 +181,10 @@ pub fn mujoco(robot: &Robot) -> String {
             let _ = writeln!(
                 out,
                 "    <joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
-                escape(&b.joint_name), escape(&robot.joints[b.coordinate].name), b.offset, b.ratio
+                escape(&b.joint_name),
+                escape(&robot.joints[b.coordinate].name),
+                b.offset,
+                b.ratio
             );
         }
         out.push_str("  </equality>\n");
@@ -171,14 +201,30 @@ fn mujoco_body(robot: &Robot, index: usize, depth: usize, out: &mut String) {
     let _ = writeln!(
         out,
         "{pad}<body name=\"{}\" pos=\"{} {} {}\" quat=\"{} {} {} {}\">",
-        escape(&body.name), p.x, p.y, p.z, q.w, q.i, q.j, q.k
+        escape(&body.name),
+        p.x,
+        p.y,
+        p.z,
+        q.w,
+        q.i,
+        q.j,
+        q.k
     );
     if let Some(c) = body.inertia.com() {
         let i = body.inertia.tensor_com();
         let _ = writeln!(
             out,
             "{pad}  <inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/>",
-            c.x, c.y, c.z, body.inertia.mass(), i.m11, i.m22, i.m33, i.m12, i.m13, i.m23
+            c.x,
+            c.y,
+            c.z,
+            body.inertia.mass(),
+            i.m11,
+            i.m22,
+            i.m33,
+            i.m12,
+            i.m13,
+            i.m23
         );
     }
     let joint = &robot.joints[body.coordinate];
@@ -209,7 +255,10 @@ fn mujoco_body(robot: &Robot, index: usize, depth: usize, out: &mut String) {
     let _ = writeln!(
         out,
         "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{} {} {}\"{attributes}/>",
-        escape(&body.joint_name), body.axis.x, body.axis.y, body.axis.z
+        escape(&body.joint_name),
+        body.axis.x,
+        body.axis.y,
+        body.axis.z
     );
     for child in (0..robot.bodies.len()).filter(|&c| robot.bodies[c].parent == Some(index)) {
         mujoco_body(robot, child, depth + 1, out);

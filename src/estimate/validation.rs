@@ -87,9 +87,17 @@ fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
         for b in (0..names.len()).filter(|b| *b != a) {
             let functions: [(String, fn(f64, f64) -> f64); 4] = [
                 (format!("the velocity of {}", names[b]), |_, y| y),
-                (format!("the direction of {}", names[b]), |_, y| if y == 0.0 { 0.0 } else { y.signum() }),
-                (format!("the direction of {} + {}", names[a], names[b]), |x, y| (x + y).signum()),
-                (format!("the direction of {} − {}", names[a], names[b]), |x, y| (x - y).signum()),
+                (format!("the direction of {}", names[b]), |_, y| {
+                    if y == 0.0 { 0.0 } else { y.signum() }
+                }),
+                (
+                    format!("the direction of {} + {}", names[a], names[b]),
+                    |x, y| (x + y).signum(),
+                ),
+                (
+                    format!("the direction of {} − {}", names[a], names[b]),
+                    |x, y| (x - y).signum(),
+                ),
             ];
             for (what, f) in functions {
                 // f and residual, both without their own velocity, direction and mean
@@ -116,12 +124,18 @@ fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
                     }
                     let norm = rest[0].iter().map(|v| v * v).sum::<f64>().sqrt();
                     let small = norm <= 1e-6 * (e.len() as f64).sqrt();
-                    rest[0].iter_mut().for_each(|r| *r = if small { 0.0 } else { *r / norm });
+                    rest[0]
+                        .iter_mut()
+                        .for_each(|r| *r = if small { 0.0 } else { *r / norm });
                 }
                 let c: f64 = list[3].iter().zip(&e).map(|(p, r)| p * r).sum();
                 let share = c * c / power.max(1e-300);
                 if share > 0.1 && best.as_ref().is_none_or(|f| share > f.share) {
-                    best = Some(Follower { actuator: a, what, share });
+                    best = Some(Follower {
+                        actuator: a,
+                        what,
+                        share,
+                    });
                 }
             }
         }

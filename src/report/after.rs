@@ -28,7 +28,10 @@ pub fn verdict(plant: &Plant, id: &Identification) -> (Tone, String) {
     );
     let tone = match &v.holdout {
         Some(h) => {
-            text += &format!(" and {} on motion that was not fitted", percent(h.relative_error));
+            text += &format!(
+                " and {} on motion that was not fitted",
+                percent(h.relative_error)
+            );
             let nominal = v.nominal.1.unwrap_or(f64::INFINITY);
             text += &format!(" (nominal model: {}).", percent(nominal));
             if h.relative_error > 2.0 * fit.max(0.01) {
@@ -91,7 +94,12 @@ pub fn html(plant: &Plant, id: &Identification, settings: &Settings) -> String {
             other => other.to_string(),
         }
     );
-    html::page(&format!("Identification of {}", plant.name()), &line, (tone, &text), &sections)
+    html::page(
+        &format!("Identification of {}", plant.name()),
+        &line,
+        (tone, &text),
+        &sections,
+    )
 }
 
 fn names(id: &Identification, purpose: Purpose) -> String {
@@ -115,7 +123,10 @@ fn tiles(id: &Identification) -> Markup {
         tiles.push((
             percent(h.relative_error),
             "torque error, holdout".into(),
-            format!("{} without prior and consistency", percent(v.plain.1.unwrap_or(f64::NAN))),
+            format!(
+                "{} without prior and consistency",
+                percent(v.plain.1.unwrap_or(f64::NAN))
+            ),
         ));
     }
     tiles.push((
@@ -169,14 +180,27 @@ fn residuals(plant: &Plant, id: &Identification) -> Section {
         })
         .collect();
     let head: &[&str] = match v.holdout {
-        Some(_) => &["joint", "fit rms", "fit", "holdout rms", "holdout", "stated noise"],
+        Some(_) => &[
+            "joint",
+            "fit rms",
+            "fit",
+            "holdout rms",
+            "holdout",
+            "stated noise",
+        ],
         None => &["joint", "fit rms", "fit", "stated noise"],
     };
     let models = [
         ("nominal", v.nominal),
         ("least squares alone", v.plain),
         ("essential parameters alone", v.essential),
-        ("this model", (v.fit.relative_error, v.holdout.as_ref().map(|h| h.relative_error))),
+        (
+            "this model",
+            (
+                v.fit.relative_error,
+                v.holdout.as_ref().map(|h| h.relative_error),
+            ),
+        ),
     ];
     let compare: Vec<Vec<Markup>> = models
         .iter()
@@ -233,7 +257,10 @@ fn followers(plant: &Plant, id: &Identification) -> Section {
 fn drawn(id: &Identification) -> Vec<&Trace> {
     let traces = &id.validation.traces;
     let first = |p: Purpose| traces.iter().find(|t| t.purpose == p);
-    let mut out: Vec<&Trace> = [Purpose::Fit, Purpose::Holdout].into_iter().filter_map(first).collect();
+    let mut out: Vec<&Trace> = [Purpose::Fit, Purpose::Holdout]
+        .into_iter()
+        .filter_map(first)
+        .collect();
     out.truncate(DRAWN);
     out
 }
@@ -249,7 +276,11 @@ fn titles(traces: &[&Trace]) -> Vec<String> {
 }
 
 /// A row for every joint, a column for every trace.
-fn grid(plant: &Plant, traces: &[&Trace], panel: impl Fn(usize, &Trace, &str) -> Panel) -> Vec<Panel> {
+fn grid(
+    plant: &Plant,
+    traces: &[&Trace],
+    panel: impl Fn(usize, &Trace, &str) -> Panel,
+) -> Vec<Panel> {
     plant
         .actuators()
         .iter()
@@ -285,13 +316,27 @@ fn torques(plant: &Plant, id: &Identification) -> Section {
         x: Axis::linear("t, s"),
         y: Axis::linear(unit),
         series: vec![
-            Series::line(points(&t.time, part(t, &t.measured, a).iter().copied()), Colour::BLUE),
-            Series::line(points(&t.time, part(t, &t.predicted, a).iter().copied()), Colour::ORANGE),
-            Series { width: 1.0, ..Series::line(points(&t.time, residual(t, a).into_iter()), Colour::GREY) },
+            Series::line(
+                points(&t.time, part(t, &t.measured, a).iter().copied()),
+                Colour::BLUE,
+            ),
+            Series::line(
+                points(&t.time, part(t, &t.predicted, a).iter().copied()),
+                Colour::ORANGE,
+            ),
+            Series {
+                width: 1.0,
+                ..Series::line(points(&t.time, residual(t, a).into_iter()), Colour::GREY)
+            },
         ],
         ..Panel::default()
     });
-    let svg = time_series("measured and predicted torque over time", rows(plant), titles(&traces), panels);
+    let svg = time_series(
+        "measured and predicted torque over time",
+        rows(plant),
+        titles(&traces),
+        panels,
+    );
     let caption = html! {
         (html::legend(&[
             (Colour::BLUE, Shape::Line, "measured"),
@@ -299,7 +344,10 @@ fn torques(plant: &Plant, id: &Identification) -> Section {
             (Colour::GREY, Shape::Line, "difference"),
         ]))
     };
-    Section::new("Measured against predicted torque", html::figure(svg, caption))
+    Section::new(
+        "Measured against predicted torque",
+        html::figure(svg, caption),
+    )
 }
 
 fn over_time(plant: &Plant, id: &Identification) -> Section {
@@ -307,14 +355,25 @@ fn over_time(plant: &Plant, id: &Identification) -> Section {
     let panels = grid(plant, &traces, |a, t, unit| Panel {
         x: Axis::linear("t, s"),
         y: Axis::linear(unit),
-        series: vec![Series::line(points(&t.time, residual(t, a).into_iter()), Colour::BLUE)],
+        series: vec![Series::line(
+            points(&t.time, residual(t, a).into_iter()),
+            Colour::BLUE,
+        )],
         ..Panel::default()
     });
-    let svg = time_series("residual torque over time", rows(plant), titles(&traces), panels);
+    let svg = time_series(
+        "residual torque over time",
+        rows(plant),
+        titles(&traces),
+        panels,
+    );
     Section::new(
         "Residual over time",
-        html::figure(svg, html! { "Measured less predicted torque. A drift is warming up; what repeats with the motion is a \
-                                   missing term." }),
+        html::figure(
+            svg,
+            html! { "Measured less predicted torque. A drift is warming up; what repeats with the motion is a \
+            missing term." },
+        ),
     )
 }
 
@@ -324,7 +383,11 @@ fn over_velocity(plant: &Plant, id: &Identification) -> Section {
         let e = residual(t, a);
         let v = part(t, &t.velocity, a);
         // mean in forty bins of velocity, where there is something to average
-        let (low, high) = v.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = v
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+                (l.min(*x), h.max(*x))
+            });
         let mut bins = vec![(0.0, 0usize); 40];
         for (x, y) in v.iter().zip(&e) {
             let k = ((x - low) / (high - low).max(1e-300) * 40.0) as usize;
@@ -336,18 +399,40 @@ fn over_velocity(plant: &Plant, id: &Identification) -> Section {
             .iter()
             .enumerate()
             .filter(|(_, b)| b.1 > 4)
-            .map(|(k, b)| [low + (k as f64 + 0.5) / 40.0 * (high - low), b.0 / b.1 as f64])
+            .map(|(k, b)| {
+                [
+                    low + (k as f64 + 0.5) / 40.0 * (high - low),
+                    b.0 / b.1 as f64,
+                ]
+            })
             .collect();
         let step = v.len().div_ceil(1500).max(1);
-        let dots: Vec<[f64; 2]> = v.iter().zip(&e).step_by(step).map(|(x, y)| [*x, *y]).collect();
+        let dots: Vec<[f64; 2]> = v
+            .iter()
+            .zip(&e)
+            .step_by(step)
+            .map(|(x, y)| [*x, *y])
+            .collect();
         Panel {
             x: Axis::linear("velocity, rad/s or m/s"),
             y: Axis::linear(unit),
             series: vec![
-                Series { width: 0.7, shape: Shape::Dots, ..Series::line(dots, Colour::GREY) },
-                Series { width: 2.0, ..Series::line(mean, Colour::VERMILLION) },
+                Series {
+                    width: 0.7,
+                    shape: Shape::Dots,
+                    ..Series::line(dots, Colour::GREY)
+                },
+                Series {
+                    width: 2.0,
+                    ..Series::line(mean, Colour::VERMILLION)
+                },
             ],
-            rules: vec![Rule { at: 0.0, upright: false, colour: Colour::QUIET, label: String::new() }],
+            rules: vec![Rule {
+                at: 0.0,
+                upright: false,
+                colour: Colour::QUIET,
+                label: String::new(),
+            }],
             ..Panel::default()
         }
     });
@@ -375,7 +460,12 @@ fn spectra(plant: &Plant, id: &Identification) -> Section {
         let length = t.time.len().min(512.max(t.time.len() / 4));
         let density = |x: &[f64]| {
             let (f, d) = welch(x, t.rate, length);
-            let list: Vec<[f64; 2]> = f.into_iter().zip(d).skip(1).map(|(f, d)| [f, d.sqrt()]).collect();
+            let list: Vec<[f64; 2]> = f
+                .into_iter()
+                .zip(d)
+                .skip(1)
+                .map(|(f, d)| [f, d.sqrt()])
+                .collect();
             list
         };
         Panel {
@@ -388,7 +478,12 @@ fn spectra(plant: &Plant, id: &Identification) -> Section {
             ..Panel::default()
         }
     });
-    let svg = time_series("spectrum of measured torque and residual", rows(plant), titles(&traces), panels);
+    let svg = time_series(
+        "spectrum of measured torque and residual",
+        rows(plant),
+        titles(&traces),
+        panels,
+    );
     let caption = html! {
         (html::legend(&[(Colour::GREY, Shape::Line, "measured"), (Colour::BLUE, Shape::Line, "residual")]))
         " Where both meet, the model explains nothing."
@@ -416,7 +511,16 @@ fn base(id: &Identification) -> Section {
             ]
         })
         .collect();
-    let head = ["base parameter", "value", "least squares", "std", "predicted std", "unit", "relative", "essential"];
+    let head = [
+        "base parameter",
+        "value",
+        "least squares",
+        "std",
+        "predicted std",
+        "unit",
+        "relative",
+        "essential",
+    ];
     Section::new(
         "Base parameters, best known first",
         html! {
@@ -501,8 +605,12 @@ fn prior(id: &Identification, settings: &Settings) -> Section {
         })
         .collect();
     let how = match settings.consistency {
-        Consistency::Entropic => "entropic distance (log-determinant divergence) from the nominal bodies",
-        Consistency::Lmi => "linear matrix inequalities and a quadratic distance from the nominal bodies",
+        Consistency::Entropic => {
+            "entropic distance (log-determinant divergence) from the nominal bodies"
+        }
+        Consistency::Lmi => {
+            "linear matrix inequalities and a quadratic distance from the nominal bodies"
+        }
         Consistency::Free => "none: unidentifiable directions stay nominal",
     };
     Section::new(
@@ -530,7 +638,13 @@ fn signals(id: &Identification) -> Section {
             let cut: Vec<String> = p
                 .position_cutoff
                 .iter()
-                .map(|f| if f.is_finite() { significant(*f, 3) } else { "–".into() })
+                .map(|f| {
+                    if f.is_finite() {
+                        significant(*f, 3)
+                    } else {
+                        "–".into()
+                    }
+                })
                 .collect();
             vec![
                 html! { (p.name) },
@@ -545,8 +659,14 @@ fn signals(id: &Identification) -> Section {
         })
         .collect();
     let head = [
-        "record", "rate, Hz", "samples", "periods averaged", "cut-off of positions, Hz", "cut-off of torque and regressor, Hz",
-        "equations a joint", "why",
+        "record",
+        "rate, Hz",
+        "samples",
+        "periods averaged",
+        "cut-off of positions, Hz",
+        "cut-off of torque and regressor, Hz",
+        "equations a joint",
+        "why",
     ];
     Section::new("Signals", html::table(&head, &[4, 7], &rows))
 }
