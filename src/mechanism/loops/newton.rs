@@ -201,13 +201,16 @@ impl Closing {
 
     /// Calls `f` with the closed configuration of each sample, or with `None`.
     fn follow(&self, x: &Samples, mut f: impl FnMut(usize, Option<&Closed>)) {
+        let home = self.at_home().ok();
         let mut last = self.at_home().ok();
         for s in 0..x.count {
             let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * x.count + s]).collect();
-            let next = match &last {
-                Some(from) if pose.iter().all(|v| v.is_finite()) => self.walk(from, &pose).ok(),
+            let from = |start: &Option<Closed>| match start {
+                Some(start) if pose.iter().all(|v| v.is_finite()) => self.walk(start, &pose).ok(),
                 _ => None,
             };
+            // a straight line from the sample before may leave the reach, that from home not
+            let next = from(&last).or_else(|| from(&home));
             f(s, next.as_ref());
             if next.is_some() {
                 last = next;
@@ -411,7 +414,7 @@ impl Geometry for Closing {
         };
         for (b, node) in self.chain.tree.nodes.iter().enumerate() {
             let from = node.parent.map_or_else(Default::default, |p| origins[p]);
-            add(format!("body{}", b + 1), [from, origins[b]]);
+            add(self.chain.names[b].clone(), [from, origins[b]]);
         }
         for closure in &self.chain.closures {
             for (frame, end) in closure.frames.iter().zip(self.chain.ends(&at.q, closure)) {
