@@ -3,6 +3,7 @@
 
 mod design;
 mod identifiability;
+mod identify;
 mod new;
 mod robots;
 mod summary;
@@ -34,6 +35,8 @@ enum Command {
     Design(design::Args),
     /// Report what a robot, and a trajectory on it, can identify
     Identifiability(identifiability::Args),
+    /// Identify the model from recorded runs
+    Identify(identify::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
     /// List the bundled robots
@@ -48,6 +51,7 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Design(a) => design::run(a),
         Command::Identifiability(a) => identifiability::run(a),
+        Command::Identify(a) => identify::run(a),
         Command::Torque(a) => torque::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
