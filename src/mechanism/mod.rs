@@ -28,13 +28,14 @@ pub mod parallelogram;
 pub mod parameters;
 pub mod scalar;
 mod singularity;
+mod states;
 pub mod task;
 pub mod tree;
 
 pub use dynamics::{ClosedMotion, ClosedWorkspace, TaskDerivatives};
 pub use forward::Solution;
 pub use geometry::{Closed, Cone, Coordinates, Geometry, Kinematics, Segment};
-pub use parameters::{Group, Parameter, Parameters, Pattern};
+pub use parameters::{Group, Parameter, Parameters, Pattern, RawColumn};
 pub use singularity::{SINGULAR, Singularity, Spread};
 pub use task::{PlatformMotion, Task};
 
