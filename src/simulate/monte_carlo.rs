@@ -82,16 +82,16 @@ fn basis(rows: usize, k: usize, period: f64, order: u32) -> Mat<f64> {
 /// Fourier coefficients of `signal` (one period, equidistant) up to harmonic `k`.
 fn coefficients(signal: &[f64], k: usize) -> Vec<f64> {
     let n = signal.len();
+    let cos: Vec<f64> = (0..n).map(|i| (TAU * i as f64 / n as f64).cos()).collect();
+    let sin: Vec<f64> = (0..n).map(|i| (TAU * i as f64 / n as f64).sin()).collect();
     (0..2 * k + 1)
         .map(|c| {
             let h = c.div_ceil(2);
+            let table = if c % 2 == 1 || c == 0 { &cos } else { &sin };
             let sum: f64 = signal
                 .iter()
                 .enumerate()
-                .map(|(i, v)| {
-                    let angle = TAU * ((h * i) % n) as f64 / n as f64;
-                    v * if c % 2 == 1 || c == 0 { angle.cos() } else { angle.sin() }
-                })
+                .map(|(i, v)| v * table[(h * i) % n])
                 .sum();
             sum / n as f64 * if c == 0 { 1.0 } else { 2.0 }
         })
