@@ -63,9 +63,12 @@ impl Plant {
     /// Reads a robot: the path of a `robot.toml` or `.urdf`, or the name of a bundled one.
     ///
     /// # Errors
-    /// As [`Robot::load`].
+    /// As [`Mechanism::load`] and [`Robot::load`].
     pub fn load(spec: &str) -> Result<Self> {
-        Ok(Plant::Serial(Robot::load(spec)?))
+        match Mechanism::load(spec)? {
+            Some(mechanism) => Ok(Plant::Parallel(Box::new(mechanism))),
+            None => Ok(Plant::Serial(Robot::load(spec)?)),
+        }
     }
 
     /// The bodies and joints: of a parallel robot its tree, passive joints included.
