@@ -58,6 +58,7 @@ pub mod design;
 pub mod dynamics;
 pub mod error;
 pub mod identifiability;
+pub mod load;
 pub mod log;
 pub mod mechanism;
 pub mod output;
