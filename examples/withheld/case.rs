@@ -30,7 +30,6 @@ pub struct Case {
     pub effects: Vec<Effect>,
     pub records: Vec<Record>,
     pub logs: Vec<Log>,
-    pub clean: Vec<Log>,
     pub figures: Figures,
 }
 
@@ -81,7 +80,11 @@ fn adjust(machine: &Machine, effects: &[Effect]) -> Machine {
 
 impl Setting {
     /// Simulates the records in their order; a thermal state cools between them.
-    fn simulate(&self, effects: &[Effect], used: impl Fn(&Record) -> bool) -> Option<(Machine, Vec<Raw>)> {
+    fn simulate(
+        &self,
+        effects: &[Effect],
+        used: impl Fn(&Record) -> bool,
+    ) -> Option<(Machine, Vec<Raw>)> {
         let machine = adjust(&self.machine, effects);
         let mut plant = Plant::new(&machine, effects);
         let mut out = Vec::new();
@@ -92,7 +95,13 @@ impl Setting {
             let mut rng = Random::new(self.seed, self.index, 16 + i as u64);
             let end = record.duration() + 1.0;
             let outer = Disturbance::new(effects, &machine, simulate::lead(record), end, &mut rng);
-            out.push(simulate::run(&machine, &mut plant, record, &outer, self.bandwidth)?);
+            out.push(simulate::run(
+                &machine,
+                &mut plant,
+                record,
+                &outer,
+                self.bandwidth,
+            )?);
             for axis in &mut plant.axes {
                 axis.friction.rest(20.0);
             }
@@ -112,12 +121,20 @@ impl Setting {
             .collect();
         let rms = |theta: &[f64]| {
             let model: Vec<Vec<DVector<f64>>> = prepared.iter().map(|p| p.model(theta)).collect();
-            let pairs: Vec<_> = prepared.iter().zip(&model).map(|(p, m)| (&p.tau[..], &m[..])).collect();
+            let pairs: Vec<_> = prepared
+                .iter()
+                .zip(&model)
+                .map(|(p, m)| (&p.tau[..], &m[..]))
+                .collect();
             energy(&pairs).1
         };
         let torque: Vec<_> = prepared.iter().map(|p| p.tau.clone()).collect();
         let theta = solve(&prepared.iter().collect::<Vec<_>>(), &torque);
-        let nominal = if machine.identified { parameters(&machine, true) } else { parameters(&machine, false) };
+        let nominal = if machine.identified {
+            parameters(&machine, true)
+        } else {
+            parameters(&machine, false)
+        };
         Some([rms(&nominal), rms(&theta)])
     }
 }
@@ -133,20 +150,33 @@ pub fn build(seed: u64, plan: &Plan) -> Result<Case, String> {
             return Ok(case);
         }
     }
-    Err(format!("case {}: {:?} could not be simulated", plan.index, plan.effects))
+    Err(format!(
+        "case {}: {:?} could not be simulated",
+        plan.index, plan.effects
+    ))
 }
 
 fn draw(seed: u64, plan: &Plan, attempt: u64) -> Option<Case> {
     let mut rng = Random::new(seed, plan.index, attempt);
-    let absorbed = plan.effects.iter().any(|e| effects::entry(e).is_some_and(|e| e.1));
-    let slow = plan.effects.iter().any(|e| effects::entry(e).is_some_and(|e| e.2));
+    let absorbed = plan
+        .effects
+        .iter()
+        .any(|e| effects::entry(e).is_some_and(|e| e.1));
+    let slow = plan
+        .effects
+        .iter()
+        .any(|e| effects::entry(e).is_some_and(|e| e.2));
     let family = rng.index(7);
     let mut machine = robots::machine(family, absorbed || rng.chance(0.3), &mut rng);
     if !plan.effects.iter().all(|e| effects::possible(e, &machine)) {
         return None;
     }
     let records = motion::records(&machine, slow || rng.chance(0.2), &mut rng);
-    let mut list: Vec<Effect> = plan.effects.iter().map(|e| effects::place(e, &machine, &mut rng)).collect();
+    let mut list: Vec<Effect> = plan
+        .effects
+        .iter()
+        .map(|e| effects::place(e, &machine, &mut rng))
+        .collect();
     if list.len() == 2 && list[0].joint == list[1].joint {
         return None;
     }
@@ -163,7 +193,11 @@ fn draw(seed: u64, plan: &Plan, attempt: u64) -> Option<Case> {
         machine,
         records,
         bandwidth: rng.range(9.0, 14.0),
-        jitter: if rng.chance(0.7) { rng.range(1e-5, 6e-5) } else { 0.0 },
+        jitter: if rng.chance(0.7) {
+            rng.range(1e-5, 6e-5)
+        } else {
+            0.0
+        },
         seed,
         index: plan.index,
     };
@@ -194,27 +228,39 @@ fn draw(seed: u64, plan: &Plan, attempt: u64) -> Option<Case> {
 fn finish(s: Setting, plan: Plan, list: Vec<Effect>, mut figures: Figures) -> Option<Case> {
     let (machine, raw) = s.simulate(&list, |_| true)?;
     let mut rng = Random::new(s.seed, s.index, 15);
-    let (mut logs, mut clean) = (Vec::new(), Vec::new());
+    let mut logs = Vec::new();
     let (mut seen, mut exact) = (Vec::new(), Vec::new());
     for (raw, record) in raw.iter().zip(&s.records) {
         let (log, noise_free) = simulate::measure(raw, &machine, record, s.jitter, &mut rng);
         exact.push(Prepared::new(&machine, &noise_free));
         seen.push(Prepared::new(&machine, &log));
         logs.push(log);
-        clean.push(noise_free);
     }
     let (truth, nominal) = (parameters(&machine, false), parameters(&machine, true));
     let fit: Vec<usize> = (0..raw.len()).filter(|i| s.records[*i].fit).collect();
     // what the true machine adds to its nominal structure, on the true motion
     let effect: Vec<Vec<DVector<f64>>> = exact
         .iter()
-        .map(|p| p.tau.iter().zip(p.model(&truth)).map(|(t, m)| t - m).collect())
+        .map(|p| {
+            p.tau
+                .iter()
+                .zip(p.model(&truth))
+                .map(|(t, m)| t - m)
+                .collect()
+        })
         .collect();
     let chosen: Vec<&Prepared> = fit.iter().map(|i| &seen[*i]).collect();
     let plain: Vec<_> = fit.iter().map(|i| seen[*i].tau.clone()).collect();
     let known: Vec<Vec<DVector<f64>>> = fit
         .iter()
-        .map(|i| seen[*i].tau.iter().zip(&effect[*i]).map(|(t, e)| t - e).collect())
+        .map(|i| {
+            seen[*i]
+                .tau
+                .iter()
+                .zip(&effect[*i])
+                .map(|(t, e)| t - e)
+                .collect()
+        })
         .collect();
     let refit = solve(&chosen, &plain);
     let oracle = solve(&chosen, &known);
@@ -229,7 +275,10 @@ fn finish(s: Setting, plan: Plan, list: Vec<Effect>, mut figures: Figures) -> Op
                 (m, i)
             })
             .collect();
-        let pairs: Vec<_> = pairs.iter().map(|(m, i)| (&m[..], &exact[*i].tau[..])).collect();
+        let pairs: Vec<_> = pairs
+            .iter()
+            .map(|(m, i)| (&m[..], &exact[*i].tau[..]))
+            .collect();
         energy(&pairs)
     };
     figures.frozen = judge(&nominal, false, true).1;
@@ -246,7 +295,6 @@ fn finish(s: Setting, plan: Plan, list: Vec<Effect>, mut figures: Figures) -> Op
         effects: list,
         records: s.records,
         logs,
-        clean,
         figures,
     })
 }

@@ -247,8 +247,7 @@ impl Chain {
                 let mut unit = [0.0; 10];
                 unit[p] = 1.0;
                 let inertia = Body::from_parameters(&unit).spatial(&k.rotation[i], &k.origin[i]);
-                let force =
-                    inertia * acc + cross_force(&k.velocity[i], &(inertia * k.velocity[i]));
+                let force = inertia * acc + cross_force(&k.velocity[i], &(inertia * k.velocity[i]));
                 for (j, row) in out.iter_mut().enumerate() {
                     row[10 * i + p] = if j <= i { k.axis[j].dot(&force) } else { 0.0 };
                 }
@@ -268,16 +267,5 @@ impl Chain {
             out[i] = k.axis[i].dot(&(sum * k.axis[i]));
         }
         out
-    }
-
-    /// Kinetic plus potential energy.
-    pub fn energy(&self, k: &Kinematics) -> f64 {
-        let mut e = 0.0;
-        for (i, joint) in self.joints.iter().enumerate() {
-            e += 0.5 * k.velocity[i].dot(&(k.inertia[i] * k.velocity[i]));
-            let weight = k.origin[i] * joint.body.mass + k.rotation[i] * joint.body.moment;
-            e -= self.gravity.dot(&weight);
-        }
-        e
     }
 }

@@ -27,7 +27,13 @@ pub struct Disturbance {
 
 impl Disturbance {
     /// `from` and `to` bound the time of the record.
-    pub fn new(effects: &[Effect], machine: &Machine, from: f64, to: f64, rng: &mut Random) -> Self {
+    pub fn new(
+        effects: &[Effect],
+        machine: &Machine,
+        from: f64,
+        to: f64,
+        rng: &mut Random,
+    ) -> Self {
         let mut d = Self {
             drag: 1.0,
             ..Self::default()
@@ -43,7 +49,11 @@ impl Disturbance {
             };
             match e.name {
                 "contact_bursts" => {
-                    let body = if e.shape[0] < 0.5 { n - 1 } else { n.min(4) - 1 };
+                    let body = if e.shape[0] < 0.5 {
+                        n - 1
+                    } else {
+                        n.min(4) - 1
+                    };
                     d.at = Some((body, tool.1));
                     let mut t = from;
                     while t < to {

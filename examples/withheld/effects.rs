@@ -116,14 +116,23 @@ pub fn place(name: &'static str, machine: &Machine, rng: &mut Random) -> Effect 
         "counterbalance" => 1,
         "joint_coupling" => n - 2,
         // a tilt or an offset of the first vertical axis changes nothing
-        "joint_offset" | "encoder_eccentricity" | "link_inertia" | "rotor_inertia" => 1 + rng.index(n - 1),
+        "joint_offset" | "encoder_eccentricity" | "link_inertia" | "rotor_inertia" => {
+            1 + rng.index(n - 1)
+        }
         _ => rng.index(n),
     };
     let mut joint = joint;
     let turning = matches!(
         name,
-        "cogging" | "transmission_error" | "encoder_eccentricity" | "joint_offset" | "counterbalance"
-            | "position_dependent_friction" | "cable_spring" | "torque_saturation" | "torque_constant"
+        "cogging"
+            | "transmission_error"
+            | "encoder_eccentricity"
+            | "joint_offset"
+            | "counterbalance"
+            | "position_dependent_friction"
+            | "cable_spring"
+            | "torque_saturation"
+            | "torque_constant"
     );
     if turning && weak(joint) {
         joint = 1;
@@ -141,8 +150,13 @@ pub fn place(name: &'static str, machine: &Machine, rng: &mut Random) -> Effect 
 pub fn possible(name: &str, machine: &Machine) -> bool {
     let scara = machine.family == "scara4";
     match name {
-        "gravity_direction" | "base_compliance" | "counterbalance" | "joint_offset" | "torque_saturation"
-        | "encoder_eccentricity" | "load_dependent_friction" => !scara,
+        "gravity_direction"
+        | "base_compliance"
+        | "counterbalance"
+        | "joint_offset"
+        | "torque_saturation"
+        | "encoder_eccentricity"
+        | "load_dependent_friction" => !scara,
         "joint_coupling" => machine.dof() >= 4 && !scara,
         _ => true,
     }

@@ -124,7 +124,8 @@ impl Friction {
             df += level * p * x.powf(p - 1.0) / self.speed;
         }
         if let Some([level, reference, p, growth]) = self.gear {
-            let loss = level * (load.abs() / reference).powf(p) * (1.0 + growth * v.abs() / self.speed);
+            let loss =
+                level * (load.abs() / reference).powf(p) * (1.0 + growth * v.abs() / self.speed);
             f += loss * sign;
             df += loss * slope;
         }

@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example withheld -- check --seed 1 --cases 60 --output target/withheld`
 
+mod attach;
 mod case;
 mod chain;
 mod disturb;
@@ -13,7 +14,10 @@ mod plant;
 mod random;
 mod refit;
 mod robots;
+mod run;
+mod score;
 mod simulate;
+mod table;
 mod write;
 
 use clap::{Args, Parser, Subcommand};
@@ -31,6 +35,20 @@ struct Cli {
 enum Command {
     /// Write cases and, apart from them, their answers
     Generate(Set),
+    /// Write cases, run the diagnosis on each and score it
+    Check {
+        #[command(flatten)]
+        set: Set,
+        #[command(flatten)]
+        run: run::Options,
+    },
+    /// Run the diagnosis on the cases of an existing set, and score it
+    Score {
+        /// Folder of the set: case_* and truth.json
+        set: PathBuf,
+        #[command(flatten)]
+        run: run::Options,
+    },
 }
 
 #[derive(Args)]
@@ -57,11 +75,17 @@ fn plans(set: &Set) -> Result<Vec<case::Plan>, String> {
         return Ok(plan::mixed(set.seed, set.cases));
     };
     if list == "all" {
-        return Ok(plan::ladder(&effects::CATALOGUE.iter().map(|e| e.0).collect::<Vec<_>>()));
+        return Ok(plan::ladder(
+            &effects::CATALOGUE.iter().map(|e| e.0).collect::<Vec<_>>(),
+        ));
     }
     let names: Result<Vec<&'static str>, String> = list
         .split(',')
-        .map(|n| effects::entry(n.trim()).map(|e| e.0).ok_or(format!("no effect is called {n}")))
+        .map(|n| {
+            effects::entry(n.trim())
+                .map(|e| e.0)
+                .ok_or(format!("no effect is called {n}"))
+        })
         .collect();
     Ok(plan::ladder(&names?))
 }
@@ -74,7 +98,10 @@ fn at(path: &Path, e: &std::io::Error) -> String {
 fn generate(set: &Set) -> Result<(), String> {
     let path = set.output.join("truth.json");
     if path.exists() && !set.force {
-        return Err(format!("{} exists; give --force to replace the set", path.display()));
+        return Err(format!(
+            "{} exists; give --force to replace the set",
+            path.display()
+        ));
     }
     let cases: Result<Vec<serde_json::Value>, String> = plans(set)?
         .par_iter()
@@ -82,7 +109,12 @@ fn generate(set: &Set) -> Result<(), String> {
             let case = case::build(set.seed, plan)?;
             let folder = set.output.join(format!("case_{:03}", plan.index));
             write::case(&case, &folder).map_err(|e| at(&folder, &e))?;
-            eprintln!("case {:3} {:8} {}", plan.index, plan.kind, plan.effects.join(" + "));
+            eprintln!(
+                "case {:3} {:8} {}",
+                plan.index,
+                plan.kind,
+                plan.effects.join(" + ")
+            );
             Ok(write::truth(&case))
         })
         .collect();
@@ -94,6 +126,8 @@ fn generate(set: &Set) -> Result<(), String> {
 fn main() -> std::process::ExitCode {
     let result = match &Cli::parse().command {
         Command::Generate(set) => generate(set),
+        Command::Check { set, run } => generate(set).and_then(|()| run::score(&set.output, run)),
+        Command::Score { set, run } => run::score(set, run),
     };
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,

@@ -4,6 +4,9 @@ use crate::random::Random;
 use crate::robots::Machine;
 use std::f64::consts::TAU;
 
+/// Centre of a joint's motion, and per harmonic its number and sine and cosine amplitudes.
+pub type Series = (f64, Vec<(f64, f64, f64)>);
+
 /// One record of a case: its motion and use.
 #[derive(Clone, Debug)]
 pub struct Record {
@@ -12,8 +15,8 @@ pub struct Record {
     pub period: f64,
     pub periods: usize,
     pub creep: bool,
-    /// Per joint: centre, and per harmonic its number and sine and cosine amplitudes.
-    pub series: Vec<(f64, Vec<(f64, f64, f64)>)>,
+    /// One a joint.
+    pub series: Vec<Series>,
 }
 
 impl Record {
@@ -83,7 +86,7 @@ fn series(
     pace: Pace,
     odd: bool,
     rng: &mut Random,
-) -> (f64, Vec<(f64, f64, f64)>) {
+) -> Series {
     let drive = &machine.drives[j];
     let [low, high] = drive.range;
     let half = 0.5 * (high - low);

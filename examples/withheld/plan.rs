@@ -7,7 +7,7 @@ use crate::random::Random;
 /// A mixed set: of twenty cases three without an effect, eleven with one, three with two and three
 /// with one that the catalogue does not know. Every effect comes before any comes again.
 pub fn mixed(seed: u64, count: usize) -> Vec<Plan> {
-    let mut rng = Random::new(seed, 0xFFFF_FF, 0);
+    let mut rng = Random::new(seed, 0x00FF_FFFF, 0);
     let mut singles: Vec<&'static str> = CATALOGUE.iter().map(|e| e.0).collect();
     let mut outside = OUTSIDE.to_vec();
     rng.shuffle(&mut singles);
@@ -19,8 +19,9 @@ pub fn mixed(seed: u64, count: usize) -> Vec<Plan> {
         p
     };
     let order = [
-        "single", "clean", "single", "outside", "single", "double", "single", "single", "clean", "single",
-        "outside", "single", "double", "single", "single", "clean", "single", "outside", "double", "single",
+        "single", "clean", "single", "outside", "single", "double", "single", "single", "clean",
+        "single", "outside", "single", "double", "single", "single", "clean", "single", "outside",
+        "double", "single",
     ];
     let (mut one, mut two, mut out) = (0, 0, 0);
     (0..count)

@@ -16,7 +16,6 @@ const DECIMATE: usize = 5;
 
 /// Filtered motion and torque on a uniform grid; joint-major.
 pub struct Prepared {
-    pub rows: usize,
     /// Regressor of each joint: `rows × columns`, in units of the joint's torque noise.
     y: Vec<DMatrix<f64>>,
     pub tau: Vec<DVector<f64>>,
@@ -53,13 +52,20 @@ fn uniform(t: &[f64], x: &[f64], grid: &[f64]) -> Vec<f64> {
 /// Smooth sign of a velocity, averaged as the logger averages the torque.
 fn sign(v: &[f64], width: f64) -> Vec<f64> {
     let at = |i: usize, u: f64| {
-        let other = if u < 0.0 { i.saturating_sub(1) } else { (i + 1).min(v.len() - 1) };
+        let other = if u < 0.0 {
+            i.saturating_sub(1)
+        } else {
+            (i + 1).min(v.len() - 1)
+        };
         v[i] + (v[other] - v[i]) * u.abs()
     };
     (0..v.len())
         .map(|i| {
             let parts = (-7..=7).map(|k| k as f64 / 8.0);
-            parts.map(|u| (1.0 - u.abs()) * (at(i, u) / width).tanh()).sum::<f64>() / 8.0
+            parts
+                .map(|u| (1.0 - u.abs()) * (at(i, u) / width).tanh())
+                .sum::<f64>()
+                / 8.0
         })
         .collect()
 }
@@ -80,7 +86,11 @@ pub fn parameters(machine: &Machine, nominal: bool) -> Vec<f64> {
     } else {
         (&machine.chain, &machine.drives)
     };
-    let mut out: Vec<f64> = chain.joints.iter().flat_map(|j| j.body.parameters()).collect();
+    let mut out: Vec<f64> = chain
+        .joints
+        .iter()
+        .flat_map(|j| j.body.parameters())
+        .collect();
     for (j, k) in joint_columns(machine) {
         let d = &drives[j];
         out.push([d.armature, d.viscous, d.coulomb, d.offset][k]);
@@ -98,7 +108,11 @@ impl Prepared {
         let tau: Vec<Vec<f64>> = log.tau.iter().map(|x| smooth(x)).collect();
         let velocity: Vec<Vec<f64>> = q
             .iter()
-            .map(|x| (1..x.len() - 1).map(|i| (x[i + 1] - x[i - 1]) / (2.0 * SAMPLE)).collect())
+            .map(|x| {
+                (1..x.len() - 1)
+                    .map(|i| (x[i + 1] - x[i - 1]) / (2.0 * SAMPLE))
+                    .collect()
+            })
             .collect();
         // the torque was filtered after friction had switched: so is the column of its sign
         let dry: Vec<Vec<f64>> = (0..n)
@@ -137,11 +151,7 @@ impl Prepared {
                 out[j][row] = w * tau[j][c + 1];
             }
         }
-        Self {
-            rows: used.len(),
-            y,
-            tau: out,
-        }
+        Self { y, tau: out }
     }
 
     /// Model torque in units of the noise.
@@ -163,7 +173,13 @@ pub fn solve(records: &[&Prepared], torque: &[Vec<DVector<f64>>]) -> Vec<f64> {
         }
     }
     let scale: Vec<f64> = (0..columns)
-        .map(|i| if gram[(i, i)] > 0.0 { gram[(i, i)].sqrt().recip() } else { 0.0 })
+        .map(|i| {
+            if gram[(i, i)] > 0.0 {
+                gram[(i, i)].sqrt().recip()
+            } else {
+                0.0
+            }
+        })
         .collect();
     for i in 0..columns {
         right[i] *= scale[i];
@@ -182,8 +198,11 @@ pub fn solve(records: &[&Prepared], torque: &[Vec<DVector<f64>>]) -> Vec<f64> {
     (0..columns).map(|i| x[i] * scale[i]).collect()
 }
 
+/// Two signals of every joint that are to agree.
+pub type Pair<'a> = (&'a [DVector<f64>], &'a [DVector<f64>]);
+
 /// Mean square of a difference, over all joints, and its root per joint; in units of the noise.
-pub fn energy(pairs: &[(&[DVector<f64>], &[DVector<f64>])]) -> (f64, Vec<f64>) {
+pub fn energy(pairs: &[Pair]) -> (f64, Vec<f64>) {
     let n = pairs[0].0.len();
     let mut sums = vec![(0.0, 0usize); n];
     for (a, b) in pairs {

@@ -175,7 +175,8 @@ fn lumps(next: Vector3<f64>, mass: f64, size: f64, rng: &mut Random) -> Vec<Lump
     let tube = Lump {
         mass: mass * shares[0],
         com: along * (0.5 * length) + off(0.05),
-        tensor: (Matrix3::identity() - aa) * (mass * shares[0] * (3.0 * r2 + length * length) / 12.0)
+        tensor: (Matrix3::identity() - aa)
+            * (mass * shares[0] * (3.0 * r2 + length * length) / 12.0)
             + aa * (mass * shares[0] * r2 * 0.5),
     };
     let ball = |m: f64, com: Vector3<f64>| Lump {
@@ -210,7 +211,6 @@ fn perturbed(lumps: &[Lump], std: f64, size: f64, rng: &mut Random) -> Body {
 /// A robot of structure `family` (0 to 6). Efforts, friction and noise follow from its weight.
 pub fn machine(family: usize, identified: bool, rng: &mut Random) -> Machine {
     let (name, plans) = structure(family);
-    let n = plans.len();
     let scale = rng.log_range(0.7, 1.9);
     let mass = rng.range(7.0, 13.0) * scale.powf(2.2);
     let error = if identified { 0.002 } else { 0.1 };
@@ -218,9 +218,9 @@ pub fn machine(family: usize, identified: bool, rng: &mut Random) -> Machine {
     let mut nominal = Vec::new();
     for (i, p) in plans.iter().enumerate() {
         let size = 0.25 * scale * 0.88f64.powi(i as i32);
-        let next = plans.get(i + 1).map_or(Vector3::zeros(), |p| {
-            Vector3::from(p.xyz) * scale
-        });
+        let next = plans
+            .get(i + 1)
+            .map_or(Vector3::zeros(), |p| Vector3::from(p.xyz) * scale);
         let parts = lumps(next, mass * 0.62f64.powi(i as i32), size, rng);
         let position = Vector3::from(p.xyz).map(|x| x * scale);
         let rotation = rpy(p.rpy[0], p.rpy[1], p.rpy[2]);
@@ -249,10 +249,20 @@ pub fn machine(family: usize, identified: bool, rng: &mut Random) -> Machine {
             let acceleration = velocity * rng.range(4.0, 6.0);
             // the smallest motors are not as small as the smallest links
             let armature = inertia[j] * rng.range(0.15, 0.5)
-                + if p.prismatic { 0.0 } else { heaviest * rng.range(0.004, 0.012) };
+                + if p.prismatic {
+                    0.0
+                } else {
+                    heaviest * rng.range(0.004, 0.012)
+                };
             let peak = weight[j] + 0.7 * (inertia[j] + armature) * acceleration;
-            let effort = peak * rng.range(1.5, 2.2) + if p.prismatic { 0.0 } else { 0.008 * strongest };
-            let half = p.half * if p.prismatic { scale } else { rng.range(0.8, 1.0) };
+            let effort =
+                peak * rng.range(1.5, 2.2) + if p.prismatic { 0.0 } else { 0.008 * strongest };
+            let half = p.half
+                * if p.prismatic {
+                    scale
+                } else {
+                    rng.range(0.8, 1.0)
+                };
             Drive {
                 name: format!("axis_{}", j + 1),
                 range: [p.home - half, p.home + half],
@@ -260,7 +270,8 @@ pub fn machine(family: usize, identified: bool, rng: &mut Random) -> Machine {
                 acceleration,
                 effort,
                 noise: effort * rng.log_range(0.002, 0.005),
-                resolution: [1.5e-5, 2.4e-5, 4.8e-5][rng.index(3)] * if p.prismatic { 0.1 } else { 1.0 },
+                resolution: [1.5e-5, 2.4e-5, 4.8e-5][rng.index(3)]
+                    * if p.prismatic { 0.1 } else { 1.0 },
                 gear: [50.0, 66.0, 80.0, 100.0, 101.0, 121.0, 160.0][rng.index(7)],
                 armature,
                 viscous: effort * rng.range(0.015, 0.05) / velocity,
@@ -277,7 +288,11 @@ pub fn machine(family: usize, identified: bool, rng: &mut Random) -> Machine {
             armature: d.armature * rng.factor(0.12 * small),
             viscous: d.viscous * rng.factor(0.25 * small),
             coulomb: d.coulomb * rng.factor(0.2 * small),
-            offset: if identified { d.offset * rng.factor(0.02) } else { 0.0 },
+            offset: if identified {
+                d.offset * rng.factor(0.02)
+            } else {
+                0.0
+            },
             ..d.clone()
         })
         .collect();

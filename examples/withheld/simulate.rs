@@ -86,8 +86,8 @@ pub fn run(
             raw.q[j].push(plant.encoder(j).0);
         }
         let log = plant.step(&command, outer, t, i as f64 * STEP);
-        for j in 0..n {
-            raw.tau[j].push(log[j]);
+        for (all, x) in raw.tau.iter_mut().zip(log) {
+            all.push(x);
         }
     }
     Some(raw)
@@ -123,8 +123,16 @@ impl Raw {
         };
         Log {
             t: t.to_vec(),
-            q: self.q.iter().map(|x| t.iter().map(|t| read(x, *t)).collect()).collect(),
-            tau: self.tau.iter().map(|x| t.iter().map(|t| average(x, *t)).collect()).collect(),
+            q: self
+                .q
+                .iter()
+                .map(|x| t.iter().map(|t| read(x, *t)).collect())
+                .collect(),
+            tau: self
+                .tau
+                .iter()
+                .map(|x| t.iter().map(|t| average(x, *t)).collect())
+                .collect(),
         }
     }
 }
@@ -137,7 +145,13 @@ pub fn times(record: &Record, extra: usize) -> Vec<f64> {
 }
 
 /// The log as written: jitter in the sample times, encoder steps, white and coloured torque noise.
-pub fn measure(raw: &Raw, machine: &Machine, record: &Record, jitter: f64, rng: &mut Random) -> (Log, Log) {
+pub fn measure(
+    raw: &Raw,
+    machine: &Machine,
+    record: &Record,
+    jitter: f64,
+    rng: &mut Random,
+) -> (Log, Log) {
     let mut t = times(record, 0);
     for (i, t) in t.iter_mut().enumerate() {
         // the written time is the true one

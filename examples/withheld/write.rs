@@ -2,6 +2,7 @@
 
 use crate::case::Case;
 use crate::effects;
+use crate::robots::Machine;
 use crate::simulate::Log;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -11,8 +12,8 @@ use std::path::Path;
 pub fn case(case: &Case, folder: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let name = format!("case_{:03}", case.plan.index);
-    std::fs::write(folder.join("robot.urdf"), urdf(case, &name))?;
-    std::fs::write(folder.join("robot.toml"), toml(case, &name))?;
+    std::fs::write(folder.join("robot.urdf"), urdf(&case.machine, &name))?;
+    std::fs::write(folder.join("robot.toml"), toml(&case.machine, &name))?;
     let mut experiment = String::from("robot = \"robot.toml\"\n");
     for (record, log) in case.records.iter().zip(&case.logs) {
         let use_ = if record.fit { "fit" } else { "holdout" };
@@ -49,14 +50,29 @@ fn csv(log: &Log) -> String {
     s
 }
 
-fn urdf(case: &Case, name: &str) -> String {
-    let m = &case.machine;
-    let mut s = format!("<?xml version=\"1.0\"?>\n<robot name=\"{name}\">\n  <link name=\"base\"/>\n");
-    for (i, (joint, drive)) in m.nominal_chain.joints.iter().zip(&m.nominal_drives).enumerate() {
-        let parent = if i == 0 { "base".into() } else { format!("link{i}") };
+/// The nominal bodies as URDF.
+pub fn urdf(m: &Machine, name: &str) -> String {
+    let mut s =
+        format!("<?xml version=\"1.0\"?>\n<robot name=\"{name}\">\n  <link name=\"base\"/>\n");
+    for (i, (joint, drive)) in m
+        .nominal_chain
+        .joints
+        .iter()
+        .zip(&m.nominal_drives)
+        .enumerate()
+    {
+        let parent = if i == 0 {
+            "base".into()
+        } else {
+            format!("link{i}")
+        };
         let (roll, pitch, yaw) =
             nalgebra::Rotation3::from_matrix_unchecked(joint.rotation).euler_angles();
-        let kind = if joint.prismatic { "prismatic" } else { "revolute" };
+        let kind = if joint.prismatic {
+            "prismatic"
+        } else {
+            "revolute"
+        };
         let (p, com, t) = (joint.position, joint.body.com(), joint.body.tensor_com());
         let _ = write!(
             s,
@@ -100,8 +116,8 @@ fn urdf(case: &Case, name: &str) -> String {
     s
 }
 
-fn toml(case: &Case, name: &str) -> String {
-    let m = &case.machine;
+/// What the URDF cannot say of the nominal model.
+pub fn toml(m: &Machine, name: &str) -> String {
     let prior = if m.identified { "identified" } else { "cad" };
     let mut s = format!(
         "name = \"{name}\"\nurdf = \"robot.urdf\"\nprior = \"{prior}\"\ngravity = [0.0, 0.0, -9.81]\n"
@@ -139,7 +155,10 @@ pub fn truth(case: &Case) -> Value {
     let m = &case.machine;
     let f = &case.figures;
     let names = |joints: Vec<usize>| -> Vec<String> {
-        joints.into_iter().map(|j| m.drives[j].name.clone()).collect()
+        joints
+            .into_iter()
+            .map(|j| m.drives[j].name.clone())
+            .collect()
     };
     let list: Vec<Value> = case
         .effects
@@ -147,7 +166,11 @@ pub fn truth(case: &Case) -> Value {
         .enumerate()
         .map(|(i, e)| {
             let frozen = effects::entry(e.name).is_some_and(|e| e.1);
-            let level = if frozen { f.visible_frozen[i] } else { f.visible[i] };
+            let level = if frozen {
+                f.visible_frozen[i]
+            } else {
+                f.visible[i]
+            };
             json!({
                 "name": e.name,
                 "joints": names(effects::joints(e, m)),
