@@ -74,13 +74,20 @@ impl Plant {
                 axis.friction.power = Some((0.15 * s * effort, 1.7 + 0.8 * x[1]));
             }
             "stribeck_friction" => {
-                axis.friction.dry = Dry::Bristle {
-                    rise: s,
-                    velocity: speed * (0.015 + 0.05 * x[0]),
-                    exponent: if x[1] < 0.5 { 1.0 } else { 2.0 },
-                    deflection: 3e-5 * speed,
-                    z: 0.0,
-                };
+                let velocity = speed * (0.02 + 0.05 * x[0]);
+                let exponent = if x[1] < 0.5 { 1.0 } else { 2.0 };
+                let f = &mut axis.friction;
+                if x[2] < 0.5 {
+                    f.stribeck = Some([s, velocity, exponent]);
+                } else {
+                    f.dry = Dry::Bristle {
+                        rise: s,
+                        velocity,
+                        exponent,
+                        deflection: 3e-5 * speed,
+                        z: 0.0,
+                    };
+                }
             }
             "presliding_hysteresis" => {
                 let deflection = 0.012 * s * speed.min(2.0);
@@ -115,8 +122,8 @@ impl Plant {
                 axis.cogging = vec![(a, order, TAU * x[1]), (0.35 * a, 2.0 * order, TAU * x[2])];
             }
             "transmission_error" => {
-                let k = stiffness(55.0);
-                let a = 0.01 * s * effort / k;
+                let k = stiffness(35.0);
+                let a = 8e-5 * s;
                 axis.spring = Some(Spring {
                     error: (a, 2.0 * drive.gear, TAU * x[1]),
                     ..spring(k)

@@ -13,6 +13,9 @@ use nalgebra::DVector;
 /// Largest size of an effect: what a robot that still works can have.
 const STRONGEST: f64 = 4.0;
 
+/// Smallest size: below it a case would be none of its effect.
+const WEAKEST: f64 = 0.01;
+
 /// What a case is to be.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -139,8 +142,10 @@ impl Setting {
     }
 }
 
-fn largest(x: &[f64]) -> f64 {
-    x.iter().copied().fold(0.0, f64::max)
+/// Root of what a joint leaves with the effect beyond what it leaves without; of the worst joint.
+fn excess(with: &[f64], without: &[f64]) -> f64 {
+    let squares = with.iter().zip(without).map(|(a, b)| a * a - b * b);
+    squares.fold(0.0, f64::max).sqrt()
 }
 
 /// Draws a case until its machine can be simulated; the draw is fixed by seed and index.
@@ -202,6 +207,12 @@ fn draw(seed: u64, plan: &Plan, attempt: u64) -> Option<Case> {
         index: plan.index,
     };
     let mut figures = Figures::default();
+    // what is left without any effect is not the effect's
+    let floor = if list.is_empty() {
+        Default::default()
+    } else {
+        [setting.visible(&[], false)?, setting.visible(&[], true)?]
+    };
     for e in &mut list {
         let judged = usize::from(!effects::entry(e.name).is_some_and(|e| e.1));
         // two records are enough to choose the size
@@ -210,14 +221,18 @@ fn draw(seed: u64, plan: &Plan, attempt: u64) -> Option<Case> {
                 e.strength *= 0.4;
                 continue;
             };
-            let ratio = plan.target / largest(&m[judged]).max(1e-6);
-            if (0.8..1.25).contains(&ratio) || (ratio > 1.0 && e.strength >= STRONGEST) {
+            let ratio = plan.target / excess(&m[judged], &floor[0][judged]).max(1e-6);
+            if (0.8..1.25).contains(&ratio)
+                || (ratio > 1.0 && e.strength >= STRONGEST)
+                || (ratio < 1.0 && e.strength <= WEAKEST)
+            {
                 break;
             }
-            e.strength = (e.strength * ratio.powf(0.9).clamp(0.02, 8.0)).min(STRONGEST);
+            let next = e.strength * ratio.powf(0.9).clamp(0.02, 8.0);
+            e.strength = next.clamp(WEAKEST, STRONGEST);
         }
         let m = setting.visible(std::slice::from_ref(e), true)?;
-        let (refit, frozen) = (largest(&m[1]), largest(&m[0]));
+        let (refit, frozen) = (excess(&m[1], &floor[1][1]), excess(&m[0], &floor[1][0]));
         figures.visible.push(refit);
         figures.visible_frozen.push(frozen);
     }

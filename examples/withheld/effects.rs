@@ -91,6 +91,8 @@ pub fn tolerated(name: &str) -> Vec<&'static str> {
         "sloshing_load" => vec!["payload", "link_inertia"],
         "transmission_error" => vec!["joint_elasticity"],
         "backlash" => vec!["joint_elasticity"],
+        // a bristle that breaks away late in a slow record
+        "stribeck_friction" => vec!["presliding_hysteresis"],
         _ => Vec::new(),
     }
 }
@@ -119,6 +121,8 @@ pub fn place(name: &'static str, machine: &Machine, rng: &mut Random) -> Effect 
         "joint_offset" | "encoder_eccentricity" | "link_inertia" | "rotor_inertia" => {
             1 + rng.index(n - 1)
         }
+        // where there is a load
+        "load_dependent_friction" | "torque_saturation" if rng.chance(0.7) => 1 + rng.index(2),
         _ => rng.index(n),
     };
     let mut joint = joint;

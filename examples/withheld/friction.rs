@@ -1,7 +1,7 @@
 //! Friction of one joint with its inner state.
 
 /// Width of the smooth sign of dry friction, rad/s or m/s per unit of the joint's speed range.
-pub const SHARP: f64 = 0.0012;
+pub const SHARP: f64 = 0.003;
 
 /// How dry friction follows the velocity.
 #[derive(Clone, Debug)]
@@ -29,6 +29,8 @@ pub struct Friction {
     pub coulomb: [f64; 2],
     pub offset: f64,
     pub dry: Dry,
+    /// Rise over Coulomb friction at low speed without a bristle: share, velocity, exponent.
+    pub stribeck: Option<[f64; 3]>,
     /// Eyring lubrication: level and velocity.
     pub eyring: Option<(f64, f64)>,
     /// Power law: level at the speed range and exponent.
@@ -52,6 +54,7 @@ impl Friction {
             coulomb: [coulomb; 2],
             offset,
             dry: Dry::Sign,
+            stribeck: None,
             eyring: None,
             power: None,
             gear: None,
@@ -76,7 +79,12 @@ impl Friction {
             coulomb *= (1.0 + a * (q + pa).cos() + b * (2.0 * q + pb).cos()).max(0.05);
         }
         let (mut f, mut df) = match &mut self.dry {
-            Dry::Sign => (coulomb * sign, coulomb * slope),
+            Dry::Sign => {
+                if let Some([rise, velocity, exponent]) = self.stribeck {
+                    coulomb *= 1.0 + rise * (-(v.abs() / velocity).powf(exponent)).exp();
+                }
+                (coulomb * sign, coulomb * slope)
+            }
             Dry::Bristle {
                 rise,
                 velocity,

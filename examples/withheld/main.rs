@@ -62,6 +62,9 @@ struct Set {
     /// Every effect at five sizes instead of a mixed set; a comma-separated list, or `all`
     #[arg(long, value_name = "EFFECTS")]
     ladder: Option<String>,
+    /// Only the cases of these numbers, separated by commas
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<usize>,
     /// Folder of the set
     #[arg(long, default_value = "target/withheld")]
     output: PathBuf,
@@ -105,6 +108,7 @@ fn generate(set: &Set) -> Result<(), String> {
     }
     let cases: Result<Vec<serde_json::Value>, String> = plans(set)?
         .par_iter()
+        .filter(|p| set.only.is_empty() || set.only.contains(&p.index))
         .map(|plan| {
             let case = case::build(set.seed, plan)?;
             let folder = set.output.join(format!("case_{:03}", plan.index));

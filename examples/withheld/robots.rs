@@ -269,8 +269,8 @@ pub fn machine(family: usize, identified: bool, rng: &mut Random) -> Machine {
                 velocity,
                 acceleration,
                 effort,
-                noise: effort * rng.log_range(0.002, 0.005),
-                resolution: [1.5e-5, 2.4e-5, 4.8e-5][rng.index(3)]
+                noise: effort * rng.log_range(0.0025, 0.006),
+                resolution: [0.6e-5, 1.2e-5, 2.4e-5][rng.index(3)]
                     * if p.prismatic { 0.1 } else { 1.0 },
                 gear: [50.0, 66.0, 80.0, 100.0, 101.0, 121.0, 160.0][rng.index(7)],
                 armature,

@@ -74,7 +74,7 @@ pub fn run(
                 let (shown, rate) = plant.encoder(j);
                 command[j] += d.armature * a[j]
                     + d.viscous * v[j]
-                    + d.coulomb * (v[j] / (0.02 * d.velocity)).tanh()
+                    + d.coulomb * (v[j] / (0.005 * d.velocity)).tanh()
                     + gains[j][0] * (q[j] - shown)
                     + gains[j][1] * (v[j] - rate);
                 if !(shown - q[j]).is_finite() || (shown - q[j]).abs() > 0.35 {
