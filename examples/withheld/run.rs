@@ -88,7 +88,15 @@ pub fn score(set: &Path, options: &Options) -> Result<(), String> {
             .and_then(|d| score::judge(answer, &d, seconds));
         match result {
             Ok(j) => judged.push(j),
-            Err(e) => failed.push((name, e)),
+            Err(e) => {
+                // a diagnosis that fails has found nothing; it has given no false name either
+                let nothing = serde_json::json!({ "verdict": "failed", "findings": [] });
+                let lost = score::judge(answer, &nothing, seconds)?;
+                if !lost.outcomes.is_empty() {
+                    judged.push(lost);
+                }
+                failed.push((name, e));
+            }
         }
     }
     let text = table::markdown(&judged, &failed);

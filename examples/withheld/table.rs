@@ -104,7 +104,7 @@ pub fn markdown(judged: &[Judged], failed: &[(String, String)]) -> String {
     };
     line(
         "cases",
-        format!("{} judged, {} failed", judged.len(), failed.len()),
+        format!("{} judged, {} diagnoses failed", judged.len(), failed.len()),
         "",
     );
     let n = clear.len();
@@ -178,7 +178,16 @@ pub fn markdown(judged: &[Judged], failed: &[(String, String)]) -> String {
     );
     let shrink = median(clear.iter().filter_map(|o| o.shrink).collect());
     line(
-        "held-out shrink over that of the true structure, median",
+        "held-out shrink over that of the true structure, median where the right name is found",
+        shrink.map_or("–".into(), |x| format!("{:.0} %", 100.0 * x)),
+        "90 %",
+    );
+    let claimed = clear
+        .iter()
+        .map(|o| o.shrink.filter(|_| o.claimed).unwrap_or(0.0));
+    let shrink = median(claimed.collect());
+    line(
+        "… where nothing right is claimed, 0",
         shrink.map_or("–".into(), |x| format!("{:.0} %", 100.0 * x)),
         "90 %",
     );
