@@ -66,8 +66,8 @@ pub mod plant;
 pub mod regressor;
 pub mod report;
 pub mod robot;
-pub mod simulate;
 pub mod signals;
+pub mod simulate;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning};

@@ -257,7 +257,10 @@ fn settings(args: &Args, plant: &Plant) -> Result<Settings> {
     effects.torque_delay = args.delay;
     effects.perturb = args.perturb;
     if let Some(text) = &args.tilt {
-        let v: Vec<f64> = text.split(',').filter_map(|x| x.trim().parse().ok()).collect();
+        let v: Vec<f64> = text
+            .split(',')
+            .filter_map(|x| x.trim().parse().ok())
+            .collect();
         effects.tilt = match v[..] {
             [x, y] if x.abs() < 1.6 && y.abs() < 1.6 => [x, y],
             _ => {

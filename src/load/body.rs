@@ -140,7 +140,11 @@ fn nearest(inertia: &Inertia, covariance: &Mat<f64>) -> Result<Inertia> {
             dense(&Inertia(phi))
         })
         .collect();
-    let terms: Vec<_> = steps.iter().enumerate().map(|(k, a)| (k, a.as_ref())).collect();
+    let terms: Vec<_> = steps
+        .iter()
+        .enumerate()
+        .map(|(k, a)| (k, a.as_ref()))
+        .collect();
     problem.semidefinite(a0.as_ref(), &terms);
     let solution = problem.solve(&Settings::default())?;
     if !solution.status.is_solved() {

@@ -75,7 +75,11 @@ pub fn estimate(plant: &Plant, tool: usize, records: &[Loaded]) -> Result<Gains>
         ));
     }
     let system = System::new(plant, tool, &used, true)?;
-    let (na, nd, np) = (system.actuators, system.deviations.len(), system.parts.len());
+    let (na, nd, np) = (
+        system.actuators,
+        system.deviations.len(),
+        system.parts.len(),
+    );
     // torque of the known load, part by part
     let known: Vec<Vec<f64>> = system
         .parts
@@ -185,7 +189,9 @@ pub fn estimate(plant: &Plant, tool: usize, records: &[Loaded]) -> Result<Gains>
         }
     }
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
-    let std: Vec<f64> = (0..na).map(|j| covariance[(j, j)].max(0.0).sqrt()).collect();
+    let std: Vec<f64> = (0..na)
+        .map(|j| covariance[(j, j)].max(0.0).sqrt())
+        .collect();
     let corrected: Vec<bool> = (0..na)
         .map(|j| (gain[j] - 1.0).abs() > 3.0 * std[j] && std[j] < 0.2)
         .collect();

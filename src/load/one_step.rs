@@ -175,8 +175,7 @@ impl<'a> Solver<'a> {
             .map(|(p, part)| {
                 (0..part.y.len())
                     .map(|i| {
-                        let mut rest =
-                            part.y[i] - self.shift[p].get(i).copied().unwrap_or(0.0);
+                        let mut rest = part.y[i] - self.shift[p].get(i).copied().unwrap_or(0.0);
                         self.row(p, part, i, &mut |c, v| rest -= values[c] * v);
                         rest
                     })
@@ -216,7 +215,13 @@ pub fn estimate(
     let na = system.actuators;
     let kept: Vec<usize> = match settings.parameters {
         Parameters::Full => system.base.kept.clone(),
-        Parameters::MassCom => system.base.kept.iter().copied().filter(|&k| k < 4).collect(),
+        Parameters::MassCom => system
+            .base
+            .kept
+            .iter()
+            .copied()
+            .filter(|&k| k < 4)
+            .collect(),
     };
     if kept.is_empty() {
         return Err(Error::Infeasible(

@@ -119,7 +119,8 @@ pub fn html(found: &Identified) -> String {
             significant(1e3 * v[3], 4),
             found.frame,
             match (load.projected, sound) {
-                (true, _) => " The estimate itself was no body that can exist; this is the nearest.",
+                (true, _) =>
+                    " The estimate itself was no body that can exist; this is the nearest.",
                 (_, false) => " The mass is uncertain: excite more, or log longer.",
                 _ => "",
             }
@@ -163,7 +164,12 @@ pub fn html(found: &Identified) -> String {
             },
         ));
     }
-    let records: Vec<&str> = found.one_step.records.iter().map(|r| r.name.as_str()).collect();
+    let records: Vec<&str> = found
+        .one_step
+        .records
+        .iter()
+        .map(|r| r.name.as_str())
+        .collect();
     html::page(
         &format!("Load: {}", found.robot),
         &format!("records {}", records.join(", ")),
@@ -185,7 +191,10 @@ fn tiles(found: &Identified) -> Section {
         (
             with_unit(v[0], 5, "kg"),
             "mass".to_string(),
-            format!("± {} %", significant(100.0 * s[0] / v[0].abs().max(1e-12), 2)),
+            format!(
+                "± {} %",
+                significant(100.0 * s[0] / v[0].abs().max(1e-12), 2)
+            ),
         ),
         (
             with_unit(1e3 * far, 2, "mm"),

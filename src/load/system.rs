@@ -141,8 +141,7 @@ impl System {
         let states = plant.random_states(400, 0x10ad);
         let names = crate::robot::inertia::NAMES.map(|n| format!("load.{n}"));
         let over = tool_columns(plant, tool, &states)?;
-        let base =
-            BaseParameters::from_matrix(names.to_vec(), units(), over.as_ref())?;
+        let base = BaseParameters::from_matrix(names.to_vec(), units(), over.as_ref())?;
         let (kept, deviations) = match deviate {
             false => (Vec::new(), Vec::new()),
             true => {

@@ -332,7 +332,10 @@ fn platform_samples(
             false => 1.0,
         })
         .collect();
-    Ok((wrenches(mechanism, tool, &part.motion, &force, &weights)?, v0))
+    Ok((
+        wrenches(mechanism, tool, &part.motion, &force, &weights)?,
+        v0,
+    ))
 }
 
 /// Wrench on the platform from forces of the actuators (actuator-major, friction taken off): `Jᵀ f`

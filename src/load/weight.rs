@@ -113,7 +113,8 @@ mod tests {
         let n = 4000;
         let speed: Vec<f64> = (0..n).map(|i| (i as f64 * 0.37).sin() * 0.2).collect();
         // deterministic, with the moments of noise
-        let noise = |i: usize| ((i as f64 * 12.9898).sin() * 43758.5453).fract() * 12f64.sqrt() / 2.0;
+        let noise =
+            |i: usize| ((i as f64 * 12.9898).sin() * 43758.5453).fract() * 12f64.sqrt() / 2.0;
         let truth = Spread {
             floor: 2.0,
             peak: 15.0,
@@ -127,7 +128,10 @@ mod tests {
         let (sum, count) = level.fold((0.0, 0), |(s, c), (r, _)| (s + r * r, c + 1));
         let floor = (sum / count as f64).sqrt();
         assert!((found.floor / floor - 1.0).abs() < 0.1, "{found:?} {floor}");
-        assert!(found.peak > 4.0 * found.floor && found.speed < 0.03, "{found:?}");
+        assert!(
+            found.peak > 4.0 * found.floor && found.speed < 0.03,
+            "{found:?}"
+        );
         let r: Vec<f64> = (0..n).map(|i| 2.0 * noise(i)).collect();
         assert_eq!(Spread::fit(&r, &speed, 0.0).peak, 0.0);
     }

@@ -118,7 +118,9 @@ impl Effects {
             _ => (1, "[JOINT=]VALUE"),
         };
         if v.len() != wanted {
-            return Err(Error::Argument(format!("{option} takes {form}, not `{text}`")));
+            return Err(Error::Argument(format!(
+                "{option} takes {form}, not `{text}`"
+            )));
         }
         let bad = match field {
             Field::Stribeck => v[0] < 0.0 || v[1] <= 0.0,

@@ -202,9 +202,7 @@ impl Simulator<'_> {
         let mut xdd = mass.solve(&force);
         let mut broken = Vec::new();
         if !sticking.is_empty() {
-            let rows = DMatrix::from_fn(sticking.len(), x.len(), |i, k| {
-                terms.d[(sticking[i], k)]
-            });
+            let rows = DMatrix::from_fn(sticking.len(), x.len(), |i, k| terms.d[(sticking[i], k)]);
             let moved = mass.solve(&rows.transpose());
             let a = &rows * &moved;
             let b = DVector::from_fn(sticking.len(), |i, _| {
@@ -247,13 +245,9 @@ impl Simulator<'_> {
         let (x, v) = (&now.x, &now.xd);
         let a1 = &now.xdd;
         let v2 = v + a1 * (0.5 * h);
-        let a2 = self
-            .evaluate(t + 0.5 * h, &(x + v * (0.5 * h)), &v2)?
-            .xdd;
+        let a2 = self.evaluate(t + 0.5 * h, &(x + v * (0.5 * h)), &v2)?.xdd;
         let v3 = v + &a2 * (0.5 * h);
-        let a3 = self
-            .evaluate(t + 0.5 * h, &(x + &v2 * (0.5 * h)), &v3)?
-            .xdd;
+        let a3 = self.evaluate(t + 0.5 * h, &(x + &v2 * (0.5 * h)), &v3)?.xdd;
         let v4 = v + &a3 * h;
         let a4 = self.evaluate(t + h, &(x + &v3 * h), &v4)?.xdd;
         let x1 = x + (v + (&v2 + &v3) * 2.0 + &v4) * (h / 6.0);
@@ -294,7 +288,11 @@ impl Simulator<'_> {
             };
             let mut part = 0.0;
             if guess > 0.0 {
-                let s = if self.modes[j] == Mode::Slides(true) { 1.0 } else { -1.0 };
+                let s = if self.modes[j] == Mode::Slides(true) {
+                    1.0
+                } else {
+                    -1.0
+                };
                 // Illinois variant of the false position
                 let (mut a, mut fa, mut b, mut fb) = (0.0, s * now.qd[j], 1.0, s * next.qd[j]);
                 let mut at = next;

@@ -104,9 +104,7 @@ fn average(signal: &[f64], count: usize, periods: usize) -> Vec<f64> {
     signal
         .chunks_exact(count)
         .flat_map(|row| {
-            (0..n).map(move |i| {
-                (0..periods).map(|p| row[p * n + i]).sum::<f64>() / periods as f64
-            })
+            (0..n).map(move |i| (0..periods).map(|p| row[p * n + i]).sum::<f64>() / periods as f64)
         })
         .collect()
 }
@@ -157,7 +155,11 @@ impl Setup<'_> {
         let project = Mat::from_fn(rows, dense, |c, i| {
             let h = c.div_ceil(2);
             let angle = TAU * ((h * i) % dense) as f64 / dense as f64;
-            let value = if c % 2 == 1 || c == 0 { angle.cos() } else { angle.sin() };
+            let value = if c % 2 == 1 || c == 0 {
+                angle.cos()
+            } else {
+                angle.sin()
+            };
             value / dense as f64 * if c == 0 { 1.0 } else { 2.0f64.sqrt() }
         });
         let b = self.base.count();
@@ -240,7 +242,9 @@ pub fn monte_carlo(
         period: fourier.period,
         periods: count / n,
         harmonics,
-        start: (0..run.motion.dof).map(|c| run.motion.q[c * count]).collect(),
+        start: (0..run.motion.dof)
+            .map(|c| run.motion.q[c * count])
+            .collect(),
     };
     let estimates = (0..rehearsals as u64)
         .into_par_iter()
@@ -256,8 +260,8 @@ pub fn monte_carlo(
         .map(|c| {
             let values: Vec<f64> = estimates.iter().map(|e| e[c]).collect();
             let mean = values.iter().sum::<f64>() / values.len() as f64;
-            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
-                / (values.len() - 1) as f64;
+            let variance =
+                values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (values.len() - 1) as f64;
             Spread {
                 parameter: setup.base.name(c).to_string(),
                 unit: setup.base.units[setup.base.kept[c]].to_string(),
@@ -299,7 +303,9 @@ fn predict(setup: &Setup, fourier: &Fourier, count: usize) -> Result<Vec<f64>> {
     Ok(match information.llt(Side::Lower) {
         Ok(llt) => {
             let covariance = llt.solve(Mat::<f64>::identity(b, b));
-            (0..b).map(|c| (covariance[(c, c)] * scale).sqrt()).collect()
+            (0..b)
+                .map(|c| (covariance[(c, c)] * scale).sqrt())
+                .collect()
         }
         Err(_) => vec![f64::INFINITY; b],
     })

@@ -188,6 +188,7 @@ impl Head<'_> {
                 torque_noise: None,
                 position_resolution: None,
                 gear_ratio: None,
+                piston: None,
                 terms: [0.0; 4],
                 identify: [false; 4],
             };
@@ -237,6 +238,7 @@ impl Head<'_> {
             if let Some(j) = setup.robot.joints.iter_mut().find(|j| j.name == joint.name) {
                 j.position_resolution = joint.position_resolution;
                 j.gear_ratio = joint.gear_ratio;
+                j.piston = joint.piston;
                 for (term, wanted) in JointTerm::ALL.into_iter().zip(joint.identify) {
                     // a term that the model has moved into a body (lumped inertia) is no column
                     let moved = j.terms[term as usize] != joint.terms[term as usize];
