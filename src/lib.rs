@@ -57,6 +57,7 @@ pub mod conic;
 pub mod design;
 pub mod dynamics;
 pub mod error;
+pub mod estimate;
 pub mod identifiability;
 pub mod load;
 pub mod log;

@@ -71,6 +71,18 @@ impl Plant {
         }
     }
 
+    /// The same robot with other joint columns in the regressor, the same for every actuator (every
+    /// joint of a tree).
+    ///
+    /// # Errors
+    /// A mechanism that cannot be put together again.
+    pub fn with_terms(self, terms: &[JointTerm]) -> Result<Self> {
+        Ok(match self {
+            Plant::Serial(robot) => Plant::Serial(robot.with_terms(terms)),
+            Plant::Parallel(mechanism) => Plant::Parallel(Box::new(mechanism.with_terms(terms))),
+        })
+    }
+
     /// The bodies and joints: of a parallel robot its tree, passive joints included.
     pub fn robot(&self) -> &Robot {
         match self {
@@ -117,6 +129,15 @@ impl Plant {
     pub fn actuators(&self) -> Vec<&Joint> {
         let joints = &self.robot().joints;
         self.actuated().into_iter().map(|a| &joints[a]).collect()
+    }
+
+    /// What a trajectory moves: the robot itself, or the task coordinates of a parallel robot as the
+    /// joints of a robot without bodies.
+    pub fn moved(&self) -> Robot {
+        match self {
+            Plant::Serial(robot) => robot.clone(),
+            Plant::Parallel(mechanism) => mechanism.task_robot(),
+        }
     }
 
     /// Names of the coordinates `x`.

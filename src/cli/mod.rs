@@ -3,6 +3,7 @@
 
 mod design;
 mod identifiability;
+mod identify;
 mod load;
 mod new;
 mod robots;
@@ -11,8 +12,8 @@ mod summary;
 mod torque;
 
 use clap::{Parser, Subcommand};
-use excite::robot::{JointTerm, Robot};
-use excite::{Error, Result, Warning};
+use excite::robot::JointTerm;
+use excite::{Error, Plant, Result, Warning};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -36,6 +37,8 @@ enum Command {
     Design(design::Args),
     /// Report what a robot, and a trajectory on it, can identify
     Identifiability(identifiability::Args),
+    /// Identify the model from recorded runs
+    Identify(identify::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
     /// Rehearse an experiment: simulate the robot and write a log
@@ -54,6 +57,7 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Design(a) => design::run(a),
         Command::Identifiability(a) => identifiability::run(a),
+        Command::Identify(a) => identify::run(a),
         Command::Torque(a) => torque::run(a),
         Command::Simulate(a) => simulate::run(a),
         Command::Load(a) => load::run(a),
@@ -93,10 +97,10 @@ fn warn(warnings: &[Warning]) {
 }
 
 /// A robot, with other joint columns where the command line asks for them.
-fn load(spec: &str, identify: Option<&[String]>) -> Result<Robot> {
-    let robot = Robot::load(spec)?;
+fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
+    let plant = Plant::load(spec)?;
     let Some(names) = identify else {
-        return Ok(robot);
+        return Ok(plant);
     };
     let mut terms = Vec::new();
     for name in names.iter().filter(|n| n.as_str() != "none") {
@@ -109,7 +113,7 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Robot> {
             }
         }
     }
-    Ok(robot.with_terms(&terms))
+    plant.with_terms(&terms)
 }
 
 /// Writes a text file into a prepared directory.

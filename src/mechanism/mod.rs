@@ -28,6 +28,7 @@ pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
 pub mod interval;
+pub mod loops;
 pub mod margins;
 mod motion_file;
 pub mod parallelogram;
@@ -50,7 +51,7 @@ pub use task::{PlatformMotion, Task};
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
-use crate::robot::{Joint, Limits, Motion, Robot};
+use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
 
 /// What a mechanism is put together from.
 #[derive(Debug)]
@@ -152,7 +153,10 @@ impl Mechanism {
             )));
         }
         let task_names: Vec<String> = match task {
-            Task::Joints(_) => geometry_joint_names(&robot, &actuated, freedoms),
+            Task::Joints(_) => match geometry.task_joints() {
+                Some(joints) => geometry_joint_names(&robot, joints, freedoms),
+                None => geometry_joint_names(&robot, &actuated, freedoms),
+            },
             _ => task.names().iter().map(|n| n.to_string()).collect(),
         };
         let (parameters, mut warnings) = Parameters::new(&mut robot, &groups);
@@ -285,7 +289,11 @@ impl Mechanism {
     pub fn task_robot(&self) -> Robot {
         let joints = self.task_names.iter().enumerate().map(|(k, name)| {
             let angle = match self.task {
-                Task::Joints(_) => self.robot.joints[self.actuated[k]].motion == Motion::Revolute,
+                Task::Joints(_) => {
+                    let joints = self.geometry.task_joints().unwrap_or(&self.actuated);
+                    let joint = joints.get(k).and_then(|&j| self.robot.joints.get(j));
+                    joint.is_some_and(|j| j.motion == Motion::Revolute)
+                }
                 _ => self.task.is_angle(k),
             };
             let motion = match angle {
@@ -325,6 +333,15 @@ impl Mechanism {
         }
     }
 
+    /// The same mechanism with other terms of its actuators as unknowns.
+    pub fn with_terms(mut self, terms: &[JointTerm]) -> Self {
+        for &a in &self.actuated {
+            self.robot.joints[a].identify = JointTerm::ALL.map(|t| terms.contains(&t));
+        }
+        self.parameters.set_terms(&self.robot);
+        self
+    }
+
     /// The same mechanism with a workspace box around home: half widths of the task coordinates.
     ///
     /// # Panics
@@ -338,7 +355,7 @@ impl Mechanism {
     }
 }
 
-/// Joints that serve as task coordinates: the first `n` actuators.
+/// Names of the joints that serve as task coordinates: the first `n` of these.
 fn geometry_joint_names(robot: &Robot, actuated: &[usize], n: usize) -> Vec<String> {
     actuated
         .iter()

@@ -9,8 +9,10 @@ use super::Mechanism;
 use super::task::{PlatformMotion, Task, from_quaternion};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
-use crate::trajectory::samples::{column_names, read_columns, read_samples};
-use nalgebra::Vector3;
+use crate::output::write_atomic;
+use crate::trajectory::Fourier;
+use crate::trajectory::samples::{Line, column_names, read_columns, read_samples, times};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
 /// Columns of a pose with its derivatives.
@@ -20,6 +22,88 @@ const POSE: [&str; 19] = [
 ];
 
 impl Mechanism {
+    /// Writes a motion of the task coordinates as CSV at `rate` hertz for so many periods, end point
+    /// included: `t`, then `q1.. dq1.. ddq1.. tau1..` of the actuators (nominal forces), then the
+    /// platform as [`Mechanism::read_motion`] reads it. Returns the number of samples.
+    ///
+    /// # Errors
+    /// A pose that cannot be taken, and as [`write_samples`](crate::trajectory::samples::write_samples).
+    pub fn write_motion(
+        &self,
+        path: impl AsRef<Path>,
+        force: bool,
+        trajectory: &Fourier,
+        periods: u32,
+        rate: f64,
+    ) -> Result<usize> {
+        let times = times(trajectory.period * f64::from(periods), rate)?;
+        let (m, na) = (self.freedoms(), self.actuators());
+        let mut header = vec!["t".to_string()];
+        for name in ["q", "dq", "ddq", "tau"] {
+            header.extend((1..=na).map(|a| format!("{name}{a}")));
+        }
+        match self.task {
+            Task::Joints(_) => {}
+            Task::Pose => header.extend(POSE.iter().map(|c| c.to_string())),
+            _ => {
+                for prefix in ["", "d", "dd"] {
+                    header.extend(self.task.names().iter().map(|n| format!("{prefix}{n}")));
+                }
+            }
+        }
+        // all is evaluated before anything is written, in pieces that fit the cache
+        const PIECE: usize = 1024;
+        let mut rows: Vec<f64> = Vec::with_capacity(times.len() * header.len());
+        for times in times.chunks(PIECE) {
+            let n = times.len();
+            let mut x = Samples::zeros(m, n);
+            let mut state = vec![0.0; 3 * m];
+            for (s, &t) in times.iter().enumerate() {
+                let (q, rest) = state.split_at_mut(m);
+                let (qd, qdd) = rest.split_at_mut(m);
+                trajectory.evaluate(t, [q, qd, qdd]);
+                for k in 0..m {
+                    x.q[k * n + s] = state[k];
+                    x.qd[k * n + s] = state[m + k];
+                    x.qdd[k * n + s] = state[2 * m + k];
+                }
+            }
+            let tree = self.motion(&x)?.tree;
+            let tau = self.nominal_torque(&x)?;
+            for (s, &t) in times.iter().enumerate() {
+                rows.push(t);
+                for a in [&tree.q, &tree.qd, &tree.qdd] {
+                    rows.extend(self.actuated.iter().map(|&j| a[j * n + s]));
+                }
+                rows.extend((0..na).map(|a| tau[a * n + s]));
+                let at = |a: &[f64]| -> Vec<f64> { (0..m).map(|k| a[k * n + s]).collect() };
+                let (q, qd, qdd) = (at(&x.q), at(&x.qd), at(&x.qdd));
+                match (self.task, self.task.motion(&q, &qd, &qdd)) {
+                    (Task::Joints(_), _) => {}
+                    (Task::Pose, Some(p)) => {
+                        let r = Rotation3::from_matrix_unchecked(p.rotation);
+                        let r = UnitQuaternion::from_rotation_matrix(&r);
+                        rows.extend(p.position.iter());
+                        rows.extend([r.w, r.i, r.j, r.k]);
+                        for v in [p.velocity, p.omega, p.acceleration, p.alpha] {
+                            rows.extend(v.iter());
+                        }
+                    }
+                    _ => [q, qd, qdd].iter().for_each(|a| rows.extend(a)),
+                }
+            }
+        }
+        write_atomic(path, force, |w| {
+            writeln!(w, "{}", header.join(","))?;
+            let mut line = Line::default();
+            for row in rows.chunks_exact(header.len()) {
+                line.row(w, row[0], row[1..].iter().copied())?;
+            }
+            Ok(())
+        })?;
+        Ok(times.len())
+    }
+
     /// Times and motion of the task coordinates of a CSV file. Columns may stand in any order;
     /// others are ignored.
     ///

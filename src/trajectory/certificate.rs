@@ -9,7 +9,7 @@ use crate::robot::Robot;
 /// A limit counts as kept when it is exceeded by no more than this part of its range.
 pub const TOLERANCE: f64 = 1e-9;
 
-/// The five kinds of limits.
+/// Kinds of limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -23,6 +23,8 @@ pub enum Kind {
     Jerk,
     /// torque or force
     Torque,
+    /// of the pose of a parallel robot: passive joint, singularity, distance
+    Pose,
 }
 
 impl Kind {
@@ -34,6 +36,7 @@ impl Kind {
             Kind::Acceleration => "acceleration",
             Kind::Jerk => "jerk",
             Kind::Torque => "torque",
+            Kind::Pose => "margin",
         }
     }
 }

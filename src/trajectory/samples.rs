@@ -170,7 +170,7 @@ pub fn write_samples(
 
 /// A line being put together, its memory kept.
 #[derive(Default)]
-struct Line(String);
+pub(crate) struct Line(String);
 
 impl Line {
     fn header(&mut self, w: &mut dyn Write, dof: usize, torque: bool) -> io::Result<()> {
@@ -183,7 +183,7 @@ impl Line {
         writeln!(w, "{text}")
     }
 
-    fn row(
+    pub(crate) fn row(
         &mut self,
         w: &mut dyn Write,
         t: f64,
