@@ -59,6 +59,7 @@ pub mod dynamics;
 pub mod error;
 pub mod estimate;
 pub mod identifiability;
+pub mod load;
 pub mod log;
 pub mod mechanism;
 pub mod output;
@@ -67,6 +68,7 @@ pub mod regressor;
 pub mod report;
 pub mod robot;
 pub mod signals;
+pub mod simulate;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning};

@@ -4,8 +4,10 @@
 mod design;
 mod identifiability;
 mod identify;
+mod load;
 mod new;
 mod robots;
+mod simulate;
 mod summary;
 mod torque;
 
@@ -39,6 +41,10 @@ enum Command {
     Identify(identify::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
+    /// Rehearse an experiment: simulate the robot and write a log
+    Simulate(simulate::Args),
+    /// Identify the load that a robot carries
+    Load(load::Args),
     /// List the bundled robots
     Robots(robots::Args),
     /// Print a commented robot.toml for a URDF
@@ -53,6 +59,8 @@ pub fn main() -> ExitCode {
         Command::Identifiability(a) => identifiability::run(a),
         Command::Identify(a) => identify::run(a),
         Command::Torque(a) => torque::run(a),
+        Command::Simulate(a) => simulate::run(a),
+        Command::Load(a) => load::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
     };

@@ -42,7 +42,7 @@ pub fn hexapod(model: &Value, top: &str, actuator: &str) -> String {
     let mut t = format!(
         "name = \"sg\"\nmechanism = \"gough-stewart\"\ngravity = {}\n\
          home = [0, 0, {:?}, 0, 0, 0]\n{top}\n[actuator]\n{actuator}\n[platform]\n{}\n\
-         [legs]\ncross = {{ mass = 0.4, inertia = [1e-3, 1e-3, 1e-3] }}\n",
+         [legs]\ncross = {{ mass = 0 }}\n",
         list(&model["g"]),
         model["neutral_height"].as_f64().unwrap(),
         lines(&body(&model["platform"]))

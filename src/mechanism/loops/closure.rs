@@ -61,6 +61,8 @@ pub(super) struct Chain {
     pub closures: Vec<Closure>,
     /// characteristic length, m: a rotation of 1 rad counts as this much
     pub length: f64,
+    /// names of the bodies
+    pub names: Vec<String>,
     /// bodies on the way to a closure
     needed: Vec<bool>,
     /// length for sliding coordinates, 1 for turning ones
@@ -91,6 +93,7 @@ impl Chain {
             tree,
             closures,
             length,
+            names: robot.bodies.iter().map(|b| b.name.clone()).collect(),
             needed,
             columns,
         }
