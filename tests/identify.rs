@@ -204,7 +204,7 @@ fn intervals_cover() {
                 noise: 0.3,
                 memory,
                 seed: 100 + seed,
-                periods: 1,
+                periods: 4,
                 rate: 400.0,
                 ..Run::default()
             };

@@ -30,13 +30,26 @@ fn least_error(frequency: &[f64], density: &[f64], noise: impl Fn(usize) -> f64)
     at.max(1)
 }
 
+/// Median of a spectrum between 0.3 and 0.45 of the rate, as the mean of the exponential distribution
+/// that it is the median of.
+fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
+    let mut high: Vec<f64> = f
+        .iter()
+        .zip(density)
+        .filter(|(f, _)| (0.3 * rate..0.45 * rate).contains(f))
+        .map(|(_, d)| *d)
+        .collect();
+    high.sort_by(f64::total_cmp);
+    high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
+}
+
 /// Frequency below which 99.99 % of the power of the position's changes lies, Hz: the band of the
 /// motion. A hundredth of the amplitude lies above it.
 pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
     let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
     let length = ((20.0 * rate) as usize).clamp(64, difference.len().max(64));
     let (f, density) = welch(&difference, rate, length);
-    let position: Vec<f64> = f
+    let mut position: Vec<f64> = f
         .iter()
         .zip(&density)
         .map(|(f, d)| {
@@ -44,6 +57,11 @@ pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
             if *f > 0.0 { d / (gain * gain) } else { 0.0 }
         })
         .collect();
+    // noise is no motion
+    let floor = 2.0 * noise_floor(&f, &position, rate);
+    position
+        .iter_mut()
+        .for_each(|p| *p = if *p > floor { *p - floor } else { 0.0 });
     let total: f64 = position.iter().sum();
     let mut sum = 0.0;
     for (f, d) in f.iter().zip(&position) {
@@ -70,17 +88,8 @@ pub fn aperiodic(q: &[f64], rate: f64) -> Cutoff {
         *d /= (gain * gain).max(1e-300);
     }
     density[0] = 0.0;
-    let mut high: Vec<f64> = f
-        .iter()
-        .zip(&density)
-        .filter(|(f, _)| (0.3 * rate..0.45 * rate).contains(f))
-        .map(|(_, d)| *d)
-        .collect();
-    high.sort_by(f64::total_cmp);
     let largest = density.iter().cloned().fold(0.0, f64::max);
-    // mean of an exponential distribution from its median
-    let floor = high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2;
-    let floor = floor.max(ROUNDING * largest);
+    let floor = noise_floor(&f, &density, rate).max(ROUNDING * largest);
     let k = least_error(&f, &density, |_| floor);
     // above what was estimated as noise nothing can be seen
     Cutoff {
