@@ -87,7 +87,7 @@ impl Prepared {
                 let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
                 let frequency = match settings.position_cutoff {
                     Some(f) => f,
-                    None => cutoff::aperiodic(q, rate)
+                    None => cutoff::aperiodic(q, rate, settings.order)
                         .frequency
                         .min(most)
                         .min(0.45 * rate),
