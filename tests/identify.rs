@@ -162,7 +162,7 @@ fn worst(id: &Identification, phi: &[f64], pi: &[f64]) -> f64 {
 
 #[test]
 fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
-    for name in excite::robot::bundled::names() {
+    for name in excite::robot::bundled::list().iter().map(|b| b.name) {
         let plant = Plant::load(name).unwrap();
         if plant.mechanism().is_some() {
             continue;
@@ -197,7 +197,7 @@ fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
 /// The same for closed chains, from the positions of the actuators alone: forward kinematics, periods.
 #[test]
 fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise() {
-    for name in excite::robot::bundled::names() {
+    for name in excite::mechanism::bundled::list().iter().map(|b| b.name) {
         let plant = Plant::load(name).unwrap();
         let Some(mechanism) = plant.mechanism() else {
             continue;

@@ -129,16 +129,25 @@ pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
         ))
     };
     let revolute = joint.motion == Motion::Revolute;
-    if let Some(gear) = joint.gear_ratio.filter(|g| g.abs() > 1.5)
-        && bounded
-        && (fits(1.0 / gear) || fits(-1.0 / gear))
-    {
-        return text(
-            "which fits its limits only after division by the gear ratio: are they those of the motor?",
-        );
-    }
-    if revolute && high.abs().max(low.abs()) > 2.0 * PI && (fits(PI / 180.0) || !bounded) {
-        return text("which looks like degrees; radians are expected");
+    let geared = joint
+        .gear_ratio
+        .is_some_and(|gear| gear.abs() > 1.5 && bounded && (fits(1.0 / gear) || fits(-1.0 / gear)));
+    let degrees =
+        revolute && high.abs().max(low.abs()) > 2.0 * PI && (fits(PI / 180.0) || !bounded);
+    match (degrees, geared) {
+        (true, true) => {
+            return text(
+                "which fits its limits as degrees, or after division by the gear ratio as positions of \
+                 the motor; radians of the joint are expected",
+            );
+        }
+        (true, false) => return text("which looks like degrees; radians are expected"),
+        (false, true) => {
+            return text(
+                "which fits its limits only after division by the gear ratio: are they those of the motor?",
+            );
+        }
+        (false, false) => {}
     }
     if !revolute && fits(1e-3) {
         return text("which looks like millimetres; metres are expected");

@@ -15,8 +15,8 @@ pub struct Cutoff {
 /// Weight of what is lost of the signal against the noise that passes.
 const BIAS: f64 = 100.0;
 
-/// Relative size below which a spectrum is rounding.
-const ROUNDING: f64 = 1e-28;
+/// Relative size below which a spectrum is rounding, or the tolerance of forward kinematics (1e-12).
+const ROUNDING: f64 = 1e-24;
 
 /// Frequency that minimises the estimated mean square error of the acceleration: what passes of the
 /// noise plus what is lost of the signal. `density` and `noise` are of the position at `frequency`.
@@ -97,15 +97,33 @@ pub fn aperiodic(q: &[f64], rate: f64, order: usize) -> Cutoff {
     density[0] = 0.0;
     let largest = density.iter().cloned().fold(0.0, f64::max);
     let floor = noise_floor(&f, &density, rate).max(ROUNDING * largest);
+    // a line of noise here and there is no signal: means over neighbours decide
+    let mut sums = vec![0.0];
+    for d in &density {
+        sums.push(sums[sums.len() - 1] + d);
+    }
+    let smooth = |k: usize| {
+        let wide = 3 + k / 16;
+        let (a, b) = (
+            k.saturating_sub(wide).max(1),
+            (k + wide + 1).min(density.len()),
+        );
+        (sums[b] - sums[a]) / (b - a).max(1) as f64
+    };
+    let signal: Vec<f64> = (0..density.len())
+        .map(|k| match k > 0 && smooth(k) > 2.0 * floor {
+            true => (density[k] - floor).max(0.0),
+            false => 0.0,
+        })
+        .collect();
     // grid of 16 cut-offs an octave, from the second bin to what was taken for noise
     let (low, high) = (f.get(2).copied().unwrap_or(0.0), 0.3 * rate);
     let mut best = (f64::INFINITY, high);
     let mut cutoff = high;
     while cutoff > low && low > 0.0 {
         let mut error = 0.0;
-        for (f, d) in f.iter().zip(&density).skip(1) {
+        for (f, signal) in f.iter().zip(&signal).skip(1) {
             let gain = 1.0 / (1.0 + (f / cutoff).powi(2 * order as i32));
-            let signal = if *d > 4.0 * floor { d - floor } else { 0.0 };
             let w4 = f.powi(4);
             error += w4 * (gain * gain * floor + BIAS * (1.0 - gain).powi(2) * signal);
         }
