@@ -151,7 +151,15 @@ fn worst(e: &[f64]) -> f64 {
 
 fn hexapod(truth: &Truth, rate: f64, count: usize, seed: u64, settings: &Settings) -> Identified {
     let plant = Plant::load("hexapod").unwrap();
-    let x = multisine(&plant, count, rate, &[2.0, 5.0, 7.0, 9.0], seed);
+    // 0.3 to 1.5 Hz in a period of 10 s
+    let base = count as f64 / rate / 10.0;
+    let x = multisine(
+        &plant,
+        count,
+        rate,
+        &[3.0, 7.0, 11.0, 15.0].map(|h| h * base),
+        seed,
+    );
     let empty = Truth {
         load: None,
         gain: truth.gain.clone(),
@@ -178,6 +186,8 @@ fn the_published_equations_hold_for_the_reference_samples() {
     };
     let text = std::fs::read_to_string(folder.join("load_two_step.json")).unwrap();
     let all: Value = serde_json::from_str(&text).unwrap();
+    let text = std::fs::read_to_string(folder.join("sg_model.json")).unwrap();
+    let model: Value = serde_json::from_str(&text).unwrap();
     let gravity = Vector3::new(0.0, 0.0, -9.81);
     for name in ["single", "multi"] {
         let case = &all["exact"][name];
@@ -185,13 +195,20 @@ fn the_published_equations_hold_for_the_reference_samples() {
         let vector = |v: &Value| common::parallel::vector(v);
         let f = common::parallel::numbers(&s["f"]);
         let force: Vector3<f64> = (0..6).map(|j| vector(&s["s"][j]) * f[j]).sum();
+        let rotation = common::parallel::matrix(&s["R"]);
+        let moment: Vector3<f64> = (0..6)
+            .map(|j| {
+                let arm = rotation * vector(&model["legs"][j]["b"]);
+                arm.cross(&(vector(&s["s"][j]) * f[j]))
+            })
+            .sum();
         let sample = PlatformSample {
-            rotation: common::parallel::matrix(&s["R"]),
+            rotation,
             omega: vector(&s["w_L"]),
             alpha: vector(&s["wd_L"]),
             acceleration: vector(&s["a_P"]),
             force,
-            moment: Vector3::zeros(),
+            moment,
             weight: 1.0,
         };
         let (phi, y) = sample.newton(&gravity);
@@ -202,8 +219,11 @@ fn the_published_equations_hold_for_the_reference_samples() {
             "{name}: {}",
             phi * theta - y
         );
-        // total minus platform is the load, as the file states it
         let jc = common::parallel::numbers(&case["JC"]);
+        let (phi, y) = sample.euler(&r);
+        let tensor = nalgebra::Vector6::from_column_slice(&jc);
+        assert!((phi * tensor - y).norm() < 1e-10, "{name}");
+        // total minus platform is the load, as the file states it
         let mut v = [0.0; 10];
         v[0] = case["m"].as_f64().unwrap();
         v[1..4].copy_from_slice(r.as_slice());
@@ -262,7 +282,8 @@ fn stribeck_friction_and_noise_stay_within_the_targets() {
     let truth = Truth {
         load: Some(from_quantities(&LOAD)),
         stribeck: 15.0,
-        noise: 2.0,
+        // 2 N at 200 Hz, mean of four periods
+        noise: 1.0,
         ..Truth::default()
     };
     let (mut one, mut plain, mut two) = ([0.0f64; 3], [0.0f64; 3], [0.0f64; 3]);
