@@ -304,6 +304,7 @@ impl Isa {
 
     /// All that this machine can run.
     pub fn available() -> Vec<Isa> {
+        #[cfg_attr(not(all(target_arch = "x86_64", feature = "wide")), allow(unused_mut))]
         let mut all = vec![Isa::Scalar, Isa::Portable];
         #[cfg(all(target_arch = "x86_64", feature = "wide"))]
         {

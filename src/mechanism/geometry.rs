@@ -14,7 +14,9 @@
 
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
-use crate::dynamics::lanes::{self, Isa, Lanes, Portable4};
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
+use crate::dynamics::lanes;
+use crate::dynamics::lanes::{Isa, Lanes, Portable4};
 use nalgebra::{DMatrix, Vector3};
 
 /// Takes the tree coordinates one by one, in any order.
@@ -115,15 +117,15 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
     /// As [`Kinematics::cones`].
     fn cones(&self, x: &[f64]) -> Vec<Cone>;
 
-    /// Where the task coordinates are joints: which of the tree coordinates they are. `None`: the
-    /// first actuators.
-    fn task_joints(&self) -> Option<&[usize]> {
-        None
-    }
-
     /// Taylor coefficients of all tree coordinates over a stretch of time, from enclosures of those
     /// of the task coordinates; `None` where the kinematics has no closed form.
     fn enclosure(&self, _x: &[Path]) -> Option<Vec<Path>> {
+        None
+    }
+
+    /// Where the task coordinates are joints: which of the tree coordinates they are. `None`: the
+    /// first actuators.
+    fn task_joints(&self) -> Option<&[usize]> {
         None
     }
 

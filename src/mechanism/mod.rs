@@ -289,7 +289,11 @@ impl Mechanism {
     pub fn task_robot(&self) -> Robot {
         let joints = self.task_names.iter().enumerate().map(|(k, name)| {
             let angle = match self.task {
-                Task::Joints(_) => self.robot.joints[self.actuated[k]].motion == Motion::Revolute,
+                Task::Joints(_) => {
+                    let joints = self.geometry.task_joints().unwrap_or(&self.actuated);
+                    let joint = joints.get(k).and_then(|&j| self.robot.joints.get(j));
+                    joint.is_some_and(|j| j.motion == Motion::Revolute)
+                }
                 _ => self.task.is_angle(k),
             };
             let motion = match angle {
