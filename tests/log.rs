@@ -202,7 +202,11 @@ fn what_is_no_log_is_an_error_with_its_place() {
             .map(|_| "1")
             .collect::<Vec<_>>()
             .join(",");
-        std::fs::write(&path, format!("{header}\n{row}\n{row}\n")).unwrap();
+        std::fs::write(
+            &path,
+            format!("{header}\n{}", format!("{row}\n").repeat(10)),
+        )
+        .unwrap();
         let e = error(path);
         assert!(e.contains(word) && e.contains("line 1"), "{header}: {e}");
     }
