@@ -26,7 +26,7 @@ fn normal(r: &mut ChaCha8Rng) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * r.random::<f64>()).cos()
 }
 
-/// Sums of sines of several frequencies in every coordinate.
+/// Sums of sines of several frequencies in every coordinate, other ones in each of a platform's.
 fn multisine(plant: &Plant, count: usize, rate: f64, harmonics: &[f64], seed: u64) -> Samples {
     let mut r = ChaCha8Rng::seed_from_u64(seed);
     let n = plant.coordinates();
@@ -42,6 +42,10 @@ fn multisine(plant: &Plant, count: usize, rate: f64, harmonics: &[f64], seed: u6
         };
         s.q[j * count..(j + 1) * count].fill(middle);
         for &h in harmonics {
+            let h = match plant.mechanism() {
+                Some(_) => h + j as f64 * period / 10.0,
+                None => h,
+            };
             let a = half / harmonics.len() as f64 * r.random_range(0.6..1.0);
             let phase = r.random_range(0.0..std::f64::consts::TAU);
             let w = std::f64::consts::TAU * h / period;
