@@ -155,13 +155,13 @@ fn worst(e: &[f64]) -> f64 {
 
 fn hexapod(truth: &Truth, rate: f64, count: usize, seed: u64, settings: &Settings) -> Identified {
     let plant = Plant::load("hexapod").unwrap();
-    // 0.3 to 1.5 Hz in a period of 10 s
+    // 0.3 to 1.8 Hz
     let base = count as f64 / rate / 10.0;
     let x = multisine(
         &plant,
         count,
         rate,
-        &[3.0, 7.0, 11.0, 15.0].map(|h| h * base),
+        &[3.0, 8.0, 13.0].map(|h| h * base),
         seed,
     );
     let empty = Truth {
@@ -286,8 +286,8 @@ fn stribeck_friction_and_noise_stay_within_the_targets() {
     let truth = Truth {
         load: Some(from_quantities(&LOAD)),
         stribeck: 15.0,
-        // 2 N at 200 Hz, mean of four periods
-        noise: 1.0,
+        // 2 N at 1 kHz: mean of 20 periods of 10 s, at 200 Hz
+        noise: 0.2,
         ..Truth::default()
     };
     let (mut one, mut plain, mut two) = ([0.0f64; 3], [0.0f64; 3], [0.0f64; 3]);
