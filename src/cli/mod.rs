@@ -2,6 +2,7 @@
 //! unusable arguments. Nothing but results goes to standard output.
 
 mod design;
+mod diagnose;
 mod identifiability;
 mod new;
 mod robots;
@@ -36,6 +37,8 @@ enum Command {
     Identifiability(identifiability::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
+    /// Diagnose
+    Diagnose(diagnose::Args),
     /// List the bundled robots
     Robots(robots::Args),
     /// Print a commented robot.toml for a URDF
@@ -49,6 +52,7 @@ pub fn main() -> ExitCode {
         Command::Design(a) => design::run(a),
         Command::Identifiability(a) => identifiability::run(a),
         Command::Torque(a) => torque::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
     };
