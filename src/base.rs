@@ -338,6 +338,23 @@ impl BaseParameters {
         }
     }
 
+    /// Fills in the simple reasons, for regressors of any kind.
+    pub fn explain_all(&mut self) {
+        for index in 0..self.standard.len() {
+            self.standard[index].reason = match self.standard[index].identifiability {
+                Identifiability::Alone => String::new(),
+                Identifiability::None => "it never acts on an actuator".into(),
+                Identifiability::Combination => {
+                    let partners = self.partners(index);
+                    match partners.is_empty() {
+                        true => String::new(),
+                        false => format!("felt only together with {}", list(&partners, 4)),
+                    }
+                }
+            };
+        }
+    }
+
     /// Names of the parameters that share a base parameter with this one.
     fn partners(&self, index: usize) -> Vec<&str> {
         let significant = |a: usize, d: usize| self.k[(a, d)].abs() > 1e-5;

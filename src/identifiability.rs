@@ -11,9 +11,13 @@
 //! (white noise, independent between samples and joints; Swevers et al. 1997, eq. 11), whose
 //! diagonal gives the predicted standard deviation of every base parameter.
 
+mod closed;
+
 use crate::base::BaseParameters;
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
+use crate::mechanism::{ClosedCertificate, PoseUse, Segment, Task};
+use crate::plant::Plant;
 use crate::regressor::{Regressor, nominal_torque};
 use crate::robot::Robot;
 use crate::trajectory::certificate::{Certificate, certify};
@@ -80,15 +84,41 @@ pub struct Excitation {
     pub certificate: Certificate,
     /// samples of the experiment that the prediction counts on: periods × samples a period
     pub samples: usize,
+    /// of a parallel robot, what its platform does; `motion` and `certificate` are then about the
+    /// actuators
+    pub platform: Option<Platform>,
+}
+
+/// What the platform of a parallel robot does.
+#[derive(Debug, Clone)]
+pub struct Platform {
+    /// what the task coordinates are
+    pub task: Task,
+    /// their names
+    pub names: Vec<String>,
+    /// one period at [`RATE`], the end point left out
+    pub motion: Samples,
+    /// workspace box, actuators, passive joints, singularities and distances
+    pub certificate: ClosedCertificate,
+    /// uses of the limits of the pose at the samples
+    pub uses: Vec<Vec<PoseUse>>,
+    /// smallest singular values at the samples: of the actuation Jacobian, of the constraint block
+    pub sigma: Vec<[Option<f64>; 2]>,
+    /// the mechanism in home and in its extreme poses: what, when, and its lines
+    pub poses: Vec<(String, Vec<Segment>)>,
 }
 
 /// The report before the run, of a robot alone or with a trajectory.
 #[derive(Debug, Clone)]
 pub struct Assessment {
-    /// the robot
+    /// the robot; of a parallel one its actuators as joints, without bodies
     pub robot: Robot,
     /// its base parameters
     pub base: BaseParameters,
+    /// nominal values of the standard parameters
+    pub values: Vec<f64>,
+    /// whether it is a parallel robot
+    pub mechanism: bool,
     /// torque noise used, per joint
     pub torque_noise: Vec<f64>,
     /// the trajectory, where one was given
@@ -143,12 +173,55 @@ impl Assessment {
             .chain(more)
             .collect();
         Ok(Assessment {
+            values: robot.parameters(),
+            mechanism: false,
             robot: robot.clone(),
             base,
             torque_noise,
             excitation: None,
             warnings,
         })
+    }
+
+    /// What a robot of either kind can tell at all.
+    ///
+    /// # Errors
+    /// As [`BaseParameters::new`].
+    pub fn of_plant(plant: &Plant) -> Result<Self> {
+        let mechanism = match plant {
+            Plant::Serial(robot) => return Self::of_robot(robot),
+            Plant::Parallel(mechanism) => mechanism,
+        };
+        let base = plant.base()?;
+        let robot = mechanism.actuator_robot();
+        let (torque_noise, more) = torque_noise(&robot);
+        let warnings = mechanism
+            .warnings
+            .iter()
+            .chain(&base.warnings)
+            .cloned()
+            .chain(more)
+            .collect();
+        Ok(Assessment {
+            values: plant.values(),
+            mechanism: true,
+            robot,
+            base,
+            torque_noise,
+            excitation: None,
+            warnings,
+        })
+    }
+
+    /// What a robot of either kind will tell on this trajectory.
+    ///
+    /// # Errors
+    /// As [`Assessment::new`]; for a parallel robot also when the motion leaves its reach.
+    pub fn with_plant(plant: &Plant, trajectory: &Trajectory) -> Result<Self> {
+        match plant {
+            Plant::Serial(robot) => Self::new(robot, trajectory),
+            Plant::Parallel(mechanism) => closed::assess(plant, mechanism, trajectory),
+        }
     }
 
     /// What a robot will tell on this trajectory.
@@ -162,20 +235,32 @@ impl Assessment {
         let motion = sample_period(&trajectory.fourier);
         let torque = nominal_torque(robot, &tree, &motion);
         let w = Regressor::with_tree(robot, &tree, &motion);
+        let certificate = certificate(robot, &tree, &trajectory.fourier)?;
+        all.excite(trajectory, motion, torque, w.mat(), certificate, None)?;
+        Ok(all)
+    }
+
+    /// Adds what a motion tells, `w` being its stacked regressor.
+    fn excite(
+        &mut self,
+        trajectory: &Trajectory,
+        motion: Samples,
+        torque: Vec<f64>,
+        w: MatRef<'_, f64>,
+        certificate: Certificate,
+        platform: Option<Platform>,
+    ) -> Result<()> {
         let (condition, singular_values, log_det) =
-            condition_numbers(&all.base, &w, &all.torque_noise)?;
-        let samples = motion.count * trajectory.periods as usize;
+            condition_numbers(&self.base, w, &self.torque_noise)?;
+        let kept = self.base.select(w);
         let predictions = predict(
-            robot,
-            &all.base,
-            all.base
-                .select(w.weighted(&all.torque_noise).as_ref())
-                .as_ref(),
+            &self.values,
+            &self.base,
+            weighted(kept.as_ref(), &self.torque_noise).as_ref(),
             f64::from(trajectory.periods),
         );
-        let certificate = certificate(robot, &tree, &trajectory.fourier)?;
-        if condition.invariant > 1e7 {
-            all.warnings.push(Warning::new(
+        if condition.invariant > 1e7 && platform.is_none() {
+            self.warnings.push(Warning::new(
                 "trajectory",
                 format!(
                     "it does not excite every base parameter: the condition number is {:.1e}",
@@ -183,7 +268,8 @@ impl Assessment {
                 ),
             ));
         }
-        all.excitation = Some(Excitation {
+        self.excitation = Some(Excitation {
+            samples: motion.count * trajectory.periods as usize,
             trajectory: trajectory.clone(),
             motion,
             torque,
@@ -192,9 +278,9 @@ impl Assessment {
             singular_values,
             predictions,
             certificate,
-            samples,
+            platform,
         });
-        Ok(all)
+        Ok(())
     }
 }
 
@@ -219,18 +305,18 @@ pub fn sample_period(fourier: &Fourier) -> Samples {
 /// When the singular values do not converge.
 pub fn condition_numbers(
     base: &BaseParameters,
-    w: &Regressor,
+    w: MatRef<'_, f64>,
     torque_noise: &[f64],
 ) -> Result<(ConditionNumbers, Vec<f64>, f64)> {
-    let invariant = singular_values((w.mat() * &base.row_space).as_ref())?;
-    let kept = base.select(w.mat());
+    let invariant = singular_values((w * &base.row_space).as_ref())?;
+    let kept = base.select(w);
     let raw = singular_values(kept.as_ref())?;
     let norms: Vec<f64> = (0..kept.ncols())
         .map(|j| kept.col(j).norm_l2().max(f64::MIN_POSITIVE))
         .collect();
     let unit = Mat::from_fn(kept.nrows(), kept.ncols(), |i, j| kept[(i, j)] / norms[j]);
     let normalised = singular_values(unit.as_ref())?;
-    let weighted = singular_values(base.select(w.weighted(torque_noise).as_ref()).as_ref())?;
+    let weighted = singular_values(weighted(kept.as_ref(), torque_noise).as_ref())?;
     let log_det = weighted.iter().map(|s| 2.0 * s.ln()).sum();
     let condition = ConditionNumbers {
         invariant: ratio(&invariant),
@@ -239,6 +325,14 @@ pub fn condition_numbers(
         weighted: ratio(&weighted),
     };
     Ok((condition, invariant, log_det))
+}
+
+/// Rows of each actuator divided by its torque noise.
+fn weighted(w: MatRef<'_, f64>, torque_noise: &[f64]) -> Mat<f64> {
+    let count = w.nrows() / torque_noise.len().max(1);
+    Mat::from_fn(w.nrows(), w.ncols(), |i, j| {
+        w[(i, j)] / torque_noise[i / count.max(1)]
+    })
 }
 
 /// Singular values by way of `R`, largest first.
@@ -261,12 +355,12 @@ fn ratio(s: &[f64]) -> f64 {
 
 /// Predicted standard deviations from the weighted regressor of one period, worst first.
 fn predict(
-    robot: &Robot,
+    values: &[f64],
     base: &BaseParameters,
     weighted: MatRef<'_, f64>,
     periods: f64,
 ) -> Vec<Prediction> {
-    let nominal = base.project(&robot.parameters());
+    let nominal = base.project(values);
     let information = weighted.transpose() * weighted;
     let b = base.count();
     let covariance = match information.llt(Side::Lower) {

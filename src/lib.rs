@@ -33,6 +33,7 @@
 //! | robot | [`robot`] | bodies, joints, limits, the ten inertial parameters |
 //! | dynamics | [`dynamics`], [`regressor`] | `τ`, `Y`, `W` and exact derivatives, in batches |
 //! | parallel | [`mechanism`] | closed chains: kinematics, `τ`, `Y`, singularities |
+//! | either | [`plant`] | serial and parallel robots as one |
 //! | base | [`base`] | base parameters, rank, what cannot be identified and why |
 //! | trajectory | [`trajectory`] | Fourier series, exact extrema, certificates, files |
 //! | design | [`design`] | the optimiser |
@@ -58,10 +59,12 @@ pub mod error;
 pub mod identifiability;
 pub mod mechanism;
 pub mod output;
+pub mod plant;
 pub mod regressor;
 pub mod report;
 pub mod robot;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning};
+pub use plant::Plant;
 pub use robot::Robot;

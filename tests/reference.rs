@@ -158,7 +158,7 @@ fn condition_numbers_are_those_of_numpy() {
         let w = Regressor::new(&robot, &sample_period(&fourier));
         let base = BaseParameters::new(&robot).unwrap();
         let noise = vec![1.0; robot.dof()];
-        let (condition, singular_values, _) = condition_numbers(&base, &w, &noise).unwrap();
+        let (condition, singular_values, _) = condition_numbers(&base, w.mat(), &noise).unwrap();
         assert_eq!(singular_values.len(), reference.rank, "{name}");
         let (found, expected) = (condition.invariant, reference.invariant.unwrap());
         assert!(

@@ -1,14 +1,14 @@
 //! `excite design ROBOT`.
 
 use super::{load, pretty, print, summary::summary, warn, write};
-use excite::design::{Condition, Criterion, Progress, Settings, design};
+use excite::design::{Condition, Criterion, Progress, Settings, design_plant};
 use excite::dynamics::Tree;
 use excite::identifiability::Assessment;
 use excite::output::prepare_dir;
 use excite::report::before;
 use excite::trajectory::samples::write_samples;
 use excite::trajectory::{Ends, Grid};
-use excite::{Error, Result};
+use excite::{Error, Plant, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,12 +18,13 @@ use std::time::Instant;
 /// Design an exciting trajectory and report on it before the run.
 #[derive(clap::Args)]
 #[command(
-    long_about = "Design an exciting trajectory: a Fourier series for each joint that minimises the \
+    long_about = "Design an exciting trajectory: a Fourier series for each joint (for each coordinate of \
+                  the platform, of a parallel robot) that minimises the \
                   condition number of the regressor (or another criterion), inside position, \
                   velocity, acceleration, jerk and torque limits for all time.\n\nWrites \
                   trajectory.json, samples.csv, report.json and report.html. Ctrl-C keeps the best \
                   trajectory found so far.",
-    after_help = "Examples:\n  excite design panda --output out\n  excite design robot.toml --harmonics 7 \
+    after_help = "Examples:\n  excite design panda --output out\n  excite design hexapod --output out\n  excite design robot.toml --harmonics 7 \
                   --period 20 --derate 0.8 --time-limit 60\n  excite design arm.urdf --criterion d \
                   --identify armature,viscous,coulomb"
 )]
@@ -62,9 +63,10 @@ pub struct Args {
     /// Criterion: condition, d, a or e
     #[arg(long, default_value = "condition", value_parser = named::<Criterion>)]
     criterion: Criterion,
-    /// Matrix judged: invariant, raw, normalised or weighted
-    #[arg(long, default_value = "invariant", value_parser = named::<Condition>)]
-    condition: Condition,
+    /// Matrix judged: invariant, raw, normalised or weighted [default: invariant; normalised for
+    /// parallel robots, whose parameters differ by orders of magnitude in size]
+    #[arg(long, value_parser = named::<Condition>)]
+    condition: Option<Condition>,
     /// Fraction of every limit that may be used
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
     derate: f64,
@@ -99,7 +101,7 @@ fn named<T: serde::de::DeserializeOwned>(text: &str) -> std::result::Result<T, S
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let robot = load(&args.robot, args.identify.as_deref())?;
+    let plant = load(&args.robot, args.identify.as_deref())?;
     let settings = Settings {
         harmonics: args.harmonics,
         period: args.period,
@@ -108,14 +110,17 @@ pub fn run(args: Args) -> Result<()> {
         ends: args.ends,
         start: args.start,
         criterion: args.criterion,
-        condition: args.condition,
+        condition: args.condition.unwrap_or(match plant {
+            Plant::Serial(_) => Condition::Invariant,
+            Plant::Parallel(_) => Condition::Normalised,
+        }),
         derate: args.derate,
         seed: args.seed,
         starts: args.starts,
         time_limit: args.time_limit,
         threads: args.threads,
     };
-    settings.check(&robot)?;
+    settings.check(&plant.moved())?;
     let length = args.rate * settings.period * f64::from(settings.periods);
     if !(args.rate > 0.0 && args.rate.is_finite() && length <= 1e8) {
         return Err(Error::Argument(format!(
@@ -150,24 +155,36 @@ pub fn run(args: Args) -> Result<()> {
         });
         bar.set_message(format!("{} starts, best {:.4}", p.starts, p.best));
     };
-    let result = design(&robot, &settings, &interrupt, &progress);
+    let result = design_plant(&plant, &settings, &interrupt, &progress);
     bar.finish_and_clear();
     let result = result?;
 
-    let assessment = Assessment::new(&result.robot, &result.trajectory)?;
+    // with the limits that were assumed
+    let plant = match plant {
+        Plant::Serial(_) => Plant::Serial(result.robot),
+        parallel => parallel,
+    };
+    let assessment = Assessment::with_plant(&plant, &result.trajectory)?;
     warn(&assessment.warnings);
     result.trajectory.write(&files[0], args.force)?;
-    let tree = Tree::new(&result.robot);
-    let torque = excite::regressor::torque_function(&result.robot, &tree);
     let fourier = &result.trajectory.fourier;
-    write_samples(
-        &files[1],
-        args.force,
-        fourier,
-        settings.periods,
-        args.rate,
-        Some(&torque),
-    )?;
+    match &plant {
+        Plant::Serial(robot) => {
+            let tree = Tree::new(robot);
+            let torque = excite::regressor::torque_function(robot, &tree);
+            write_samples(
+                &files[1],
+                args.force,
+                fourier,
+                settings.periods,
+                args.rate,
+                Some(&torque),
+            )?;
+        }
+        Plant::Parallel(mechanism) => {
+            mechanism.write_motion(&files[1], args.force, fourier, settings.periods, args.rate)?;
+        }
+    }
     let json = before::json(
         &assessment,
         Some(&result.record),

@@ -42,16 +42,16 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let robot = load(&args.robot, args.identify.as_deref())?;
+    let plant = load(&args.robot, args.identify.as_deref())?;
     let trajectory = args.trajectory.as_ref().map(Trajectory::read).transpose()?;
     if let (Some(t), Some(path)) = (&trajectory, &args.trajectory) {
-        t.matches(&robot)
+        t.matches(&plant.moved())
             .map_err(|e| Error::file(path, "", e.to_string()))?;
     }
     let files = prepare_dir(&args.output, &["report.json", "report.html"], args.force)?;
     let assessment = match &trajectory {
-        Some(t) => Assessment::new(&robot, t)?,
-        None => Assessment::of_robot(&robot)?,
+        Some(t) => Assessment::with_plant(&plant, t)?,
+        None => Assessment::of_plant(&plant)?,
     };
     warn(&assessment.warnings);
     let json = before::json(&assessment, None, begin.elapsed().as_secs_f64());

@@ -10,8 +10,8 @@ mod summary;
 mod torque;
 
 use clap::{Parser, Subcommand};
-use excite::robot::{JointTerm, Robot};
-use excite::{Error, Result, Warning};
+use excite::robot::JointTerm;
+use excite::{Error, Plant, Result, Warning};
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -89,10 +89,10 @@ fn warn(warnings: &[Warning]) {
 }
 
 /// A robot, with other joint columns where the command line asks for them.
-fn load(spec: &str, identify: Option<&[String]>) -> Result<Robot> {
-    let robot = Robot::load(spec)?;
+fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
+    let plant = Plant::load(spec)?;
     let Some(names) = identify else {
-        return Ok(robot);
+        return Ok(plant);
     };
     let mut terms = Vec::new();
     for name in names.iter().filter(|n| n.as_str() != "none") {
@@ -105,7 +105,7 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Robot> {
             }
         }
     }
-    Ok(robot.with_terms(&terms))
+    plant.with_terms(&terms)
 }
 
 /// Writes a text file into a prepared directory.

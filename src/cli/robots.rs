@@ -1,6 +1,7 @@
 //! `excite robots`.
 
 use excite::Result;
+use excite::mechanism::bundled as parallel;
 use excite::robot::bundled;
 
 /// List the bundled robots.
@@ -14,10 +15,16 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let mut text = String::new();
-    for robot in bundled::list() {
-        text.push_str(&format!("{:<10} {}\n", robot.name, robot.description));
+    let serial = bundled::list()
+        .iter()
+        .map(|b| (b.name, b.description, b.source));
+    let parallel = parallel::list()
+        .iter()
+        .map(|b| (b.name, b.description, b.source));
+    for (name, description, source) in serial.chain(parallel) {
+        text.push_str(&format!("{name:<10} {description}\n"));
         if args.sources {
-            text.push_str(&format!("{:<10} source: {}\n", "", robot.source));
+            text.push_str(&format!("{:<10} source: {source}\n", ""));
         }
     }
     super::print(&text)

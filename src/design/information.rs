@@ -18,7 +18,9 @@
 //!
 //! so the derivative of any spectral function of `G` costs a few inverse dynamics.
 
+use super::closed::ClosedModel;
 use crate::dynamics::{Derivatives, Samples, Tree, Workspace};
+use crate::mechanism::{ClosedWorkspace, Mechanism, TaskDerivatives};
 use crate::robot::{Column, JointTerm, Robot};
 use crate::trajectory::{Basis, Table};
 use faer::linalg::matmul::matmul;
@@ -26,26 +28,52 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// Everything about the problem that does not change while `x` does.
 #[derive(Debug, Clone)]
-pub struct Information {
-    tree: Tree,
+pub struct Information<'a> {
     dof: usize,
     count: usize,
     free: usize,
-    columns: usize,
-    /// joint term columns: (column, joint, term)
-    terms: Vec<(usize, usize, JointTerm)>,
-    /// bodies that joint `j` moves lie in this range
-    active: Vec<(usize, usize)>,
     /// `N × m` for position, velocity, acceleration
     designs: [Mat<f64>; 3],
     /// constant part of the position of each joint
     rest: Vec<f64>,
     /// `B`
     transform: Mat<f64>,
+    model: Model<'a>,
+}
+
+/// What moves.
+#[derive(Debug, Clone)]
+enum Model<'a> {
+    Tree(TreeModel),
+    Closed(ClosedModel<'a>),
+}
+
+/// A serial or tree robot.
+#[derive(Debug, Clone)]
+struct TreeModel {
+    tree: Tree,
+    columns: usize,
+    /// joint term columns: (column, joint, term)
+    terms: Vec<(usize, usize, JointTerm)>,
+    /// bodies that joint `j` moves lie in this range
+    active: Vec<(usize, usize)>,
     /// `1/σ_j²`
     weights: Vec<f64>,
     /// width over which `sign(q̇)` is rounded, per joint
     sign_width: Vec<f64>,
+}
+
+/// Width over which `sign(q̇)` is rounded, so that it has a derivative: a hundredth of the velocity
+/// limit, 0.02 rad/s or m/s where there is none.
+pub(super) fn sign_width(robot: &Robot) -> Vec<f64> {
+    robot
+        .joints
+        .iter()
+        .map(|j| match j.limits.velocity.is_finite() {
+            true => 0.01 * j.limits.velocity,
+            false => 0.02,
+        })
+        .collect()
 }
 
 /// Memory of one evaluation; grows once.
@@ -56,11 +84,15 @@ pub struct Evaluation {
     /// `G`, lower triangle and upper
     pub gram: Mat<f64>,
     ws: Workspace,
-    blocks: Vec<f64>,
+    pub(super) blocks: Vec<f64>,
     full: Mat<f64>,
-    rates: Vec<f64>,
+    pub(super) rates: Vec<f64>,
     phi: Vec<f64>,
     derivatives: Derivatives,
+    /// of closed chains
+    pub(super) closed: ClosedWorkspace,
+    pub(super) task: TaskDerivatives,
+    pub(super) projected: Mat<f64>,
 }
 
 impl Default for Evaluation {
@@ -74,11 +106,53 @@ impl Default for Evaluation {
             rates: Vec::new(),
             phi: Vec::new(),
             derivatives: Derivatives::default(),
+            closed: ClosedWorkspace::default(),
+            task: TaskDerivatives::default(),
+            projected: Mat::new(),
         }
     }
 }
 
-impl Information {
+impl<'a> Information<'a> {
+    /// For a closed chain: `transform` has as many rows as the mechanism has parameters,
+    /// `torque_noise` is that of its actuators, where rows are to be weighted.
+    pub fn closed(
+        mechanism: &'a Mechanism,
+        basis: &Basis,
+        period: f64,
+        count: usize,
+        transform: Mat<f64>,
+        torque_noise: Option<&[f64]>,
+    ) -> Self {
+        let model = ClosedModel::new(mechanism, transform.as_ref(), torque_noise);
+        let dof = mechanism.freedoms();
+        Self::assemble(dof, basis, period, count, transform, Model::Closed(model))
+    }
+
+    fn assemble(
+        dof: usize,
+        basis: &Basis,
+        period: f64,
+        count: usize,
+        transform: Mat<f64>,
+        model: Model<'a>,
+    ) -> Self {
+        let table = Table::new(period, &basis.harmonics, count);
+        let designs = [0, 1, 2].map(|order| {
+            let d = table.design(order) * &basis.map;
+            Mat::from_fn(count, basis.free(), |i, k| d[(i, k)])
+        });
+        Information {
+            dof,
+            count,
+            free: basis.free(),
+            designs,
+            rest: basis.offset.iter().map(|o| o[0]).collect(),
+            transform,
+            model,
+        }
+    }
+
     /// For a robot, a parametrisation, a period and `count` samples.
     ///
     /// `transform` is `B`, with as many rows as the robot has columns; `torque_noise` the
@@ -93,11 +167,6 @@ impl Information {
     ) -> Self {
         let tree = Tree::new(robot);
         let dof = robot.dof();
-        let table = Table::new(period, &basis.harmonics, count);
-        let designs = [0, 1, 2].map(|order| {
-            let d = table.design(order) * &basis.map;
-            Mat::from_fn(count, basis.free(), |i, k| d[(i, k)])
-        });
         let active = (0..dof)
             .map(|j| {
                 let moved = || (0..tree.bodies()).filter(|&b| tree.moves(j, b));
@@ -116,33 +185,18 @@ impl Information {
                 Column::Inertial { .. } => None,
             })
             .collect();
-        Information {
-            dof,
-            count,
-            free: basis.free(),
+        let model = TreeModel {
             columns: robot.parameter_count(),
             terms,
             active,
-            designs,
-            rest: basis.offset.iter().map(|o| o[0]).collect(),
-            transform,
             weights: match torque_noise {
                 Some(s) => s.iter().map(|s| 1.0 / (s * s)).collect(),
                 None => vec![1.0; dof],
             },
-            sign_width: robot
-                .joints
-                .iter()
-                .map(|j| {
-                    if j.limits.velocity.is_finite() {
-                        0.01 * j.limits.velocity
-                    } else {
-                        0.02
-                    }
-                })
-                .collect(),
+            sign_width: sign_width(robot),
             tree,
-        }
+        };
+        Self::assemble(dof, basis, period, count, transform, Model::Tree(model))
     }
 
     /// Length of `x`.
@@ -155,9 +209,17 @@ impl Information {
         self.len() == 0
     }
 
-    /// Rows of `W`: samples times joints.
+    /// Rows of `W`: samples times actuators.
     pub fn rows(&self) -> usize {
-        self.dof * self.count
+        match &self.model {
+            Model::Tree(_) => self.dof * self.count,
+            Model::Closed(c) => c.mechanism().actuators() * self.count,
+        }
+    }
+
+    /// Samples of a period.
+    pub fn count(&self) -> usize {
+        self.count
     }
 
     /// Order of `G`.
@@ -170,9 +232,12 @@ impl Information {
         self.transform.as_ref()
     }
 
-    /// The flattened robot.
+    /// The flattened robot; of a closed chain its tree.
     pub fn tree(&self) -> &Tree {
-        &self.tree
+        match &self.model {
+            Model::Tree(t) => &t.tree,
+            Model::Closed(c) => c.mechanism().tree(),
+        }
     }
 
     /// Positions, velocities and accelerations at the samples.
@@ -196,17 +261,23 @@ impl Information {
         }
     }
 
-    /// Evaluates the motion, the regressor and `G`.
+    /// Evaluates the motion, the regressor and `G`; a motion that a closed chain cannot make gives
+    /// a `G` of zeros.
     pub fn evaluate(&self, x: &[f64], e: &mut Evaluation) {
         self.sample(x, &mut e.motion);
-        let (n, p, c) = (self.count, self.columns, self.dof);
+        let model = match &self.model {
+            Model::Tree(model) => model,
+            Model::Closed(model) => return model.evaluate(e),
+        };
+        let (n, p, c) = (self.count, model.columns, self.dof);
         e.blocks.resize(n * p * c, 0.0);
-        self.tree
+        model
+            .tree
             .regressor_blocks(&mut e.ws, &e.motion, &mut e.blocks, p);
-        for &(column, joint, term) in &self.terms {
+        for &(column, joint, term) in &model.terms {
             let at = (joint * p + column) * n;
             for i in 0..n {
-                e.blocks[at + i] = self.factor(joint, term, e.motion.at(joint, i));
+                e.blocks[at + i] = model.factor(joint, term, e.motion.at(joint, i));
             }
         }
         if e.full.nrows() != p {
@@ -217,13 +288,13 @@ impl Information {
         for j in 0..c {
             let block =
                 MatRef::from_column_major_slice(&e.blocks[j * p * n..(j + 1) * p * n], n, p);
-            let (from, to) = (10 * self.active[j].0, 10 * self.active[j].1);
+            let (from, to) = (10 * model.active[j].0, 10 * model.active[j].1);
             let bodies = block.subcols(from, to - from);
-            let w = self.weights[j];
+            let w = model.weights[j];
             let size = to - from;
             let target = e.full.as_mut().submatrix_mut(from, from, size, size);
             matmul(target, Accum::Add, bodies.transpose(), bodies, w, Par::Seq);
-            let own = self.terms.iter().filter(|t| t.1 == j);
+            let own = model.terms.iter().filter(|t| t.1 == j);
             for &(column, ..) in own.clone() {
                 let x = block.col(column);
                 for k in from..to {
@@ -243,17 +314,25 @@ impl Information {
     /// Gradients `∂(uᵀG u)/∂x` for each column `u` of `vectors` (`r × k`), as the columns of the
     /// result (`x` × `k`). Needs [`Information::evaluate`] at the same point before.
     pub fn quadratic_gradients(&self, e: &mut Evaluation, vectors: MatRef<'_, f64>) -> Mat<f64> {
-        let (n, p, k) = (self.count, self.columns, vectors.ncols());
+        let model = match &self.model {
+            Model::Tree(model) => model,
+            Model::Closed(model) => {
+                model.quadratic_gradients(e, vectors);
+                let d = &e.task;
+                return self.contract([&d.x, &d.xd, &d.xdd], vectors.ncols());
+            }
+        };
+        let (n, p, k) = (self.count, model.columns, vectors.ncols());
         let step = n * self.dof;
         let phi = &self.transform * vectors;
         e.rates.resize(k * step, 0.0);
         for j in 0..self.dof {
             let block =
                 MatRef::from_column_major_slice(&e.blocks[j * p * n..(j + 1) * p * n], n, p);
-            let (from, to) = (10 * self.active[j].0, 10 * self.active[j].1);
+            let (from, to) = (10 * model.active[j].0, 10 * model.active[j].1);
             let at = &mut e.rates[j * n..];
             let out = MatMut::from_column_major_slice_with_stride_mut(at, n, k, step);
-            let (w, bodies) = (2.0 * self.weights[j], block.subcols(from, to - from));
+            let (w, bodies) = (2.0 * model.weights[j], block.subcols(from, to - from));
             matmul(
                 out,
                 Accum::Replace,
@@ -262,7 +341,7 @@ impl Information {
                 w,
                 Par::Seq,
             );
-            for &(column, ..) in self.terms.iter().filter(|t| t.1 == j) {
+            for &(column, ..) in model.terms.iter().filter(|t| t.1 == j) {
                 for v in 0..k {
                     let f = w * phi[(column, v)];
                     for i in 0..n {
@@ -271,14 +350,15 @@ impl Information {
                 }
             }
         }
-        let inertial = 10 * self.tree.bodies();
+        let inertial = 10 * model.tree.bodies();
         e.phi.clear();
         for v in 0..k {
             e.phi.extend((0..inertial).map(|c| phi[(c, v)]));
         }
-        self.tree
+        model
+            .tree
             .gradients(&mut e.ws, &e.phi, &e.motion, &e.rates, &mut e.derivatives);
-        for &(column, joint, term) in &self.terms {
+        for &(column, joint, term) in &model.terms {
             for v in 0..k {
                 let f = phi[(column, v)];
                 let at = v * step + joint * n;
@@ -288,7 +368,7 @@ impl Information {
                         JointTerm::Armature => e.derivatives.qdd[at + i] += r,
                         JointTerm::Viscous => e.derivatives.qd[at + i] += r,
                         JointTerm::Coulomb => {
-                            let s = self.sign_width[joint];
+                            let s = model.sign_width[joint];
                             let v = e.motion.qd[joint * n + i];
                             e.derivatives.qd[at + i] += r * s * s / (v * v + s * s).powf(1.5);
                         }
@@ -297,13 +377,14 @@ impl Information {
                 }
             }
         }
-        self.contract(&e.derivatives, k)
+        let d = &e.derivatives;
+        self.contract([&d.q, &d.qd, &d.qdd], k)
     }
 
     /// Chain rule from samples to `x`: `Σ_i D_0ᵀ ∂/∂q + D_1ᵀ ∂/∂q̇ + D_2ᵀ ∂/∂q̈`.
-    fn contract(&self, d: &Derivatives, k: usize) -> Mat<f64> {
+    fn contract(&self, d: [&[f64]; 3], k: usize) -> Mat<f64> {
         let mut out = Mat::zeros(self.free, self.dof * k);
-        for (design, g) in self.designs.iter().zip([&d.q, &d.qd, &d.qdd]) {
+        for (design, g) in self.designs.iter().zip(d) {
             let g = MatRef::from_column_major_slice(g, self.count, self.dof * k);
             matmul(
                 out.as_mut(),
@@ -318,20 +399,24 @@ impl Information {
         Mat::from_fn(self.len(), k, |i, v| out[(i % m, v * self.dof + i / m)])
     }
 
-    /// Chain rule of one sample: gradient with respect to `x` of a scalar at sample `i`.
-    pub fn pull_back(&self, d: &Derivatives, i: usize) -> Vec<f64> {
+    /// Chain rule of one sample: gradient with respect to `x` of a scalar at sample `i`, from its
+    /// derivatives by position, velocity and acceleration of each coordinate.
+    pub fn pull_back(&self, i: usize, d: [&[f64]; 3]) -> Vec<f64> {
         let mut out = vec![0.0; self.len()];
-        for (design, g) in self.designs.iter().zip([&d.q, &d.qd, &d.qdd]) {
-            for j in 0..self.dof {
-                let g = g[j * self.count + i];
-                for k in 0..self.free {
-                    out[j * self.free + k] += design[(i, k)] * g;
+        for (design, g) in self.designs.iter().zip(d) {
+            for (j, g) in g.iter().enumerate() {
+                if *g != 0.0 {
+                    for k in 0..self.free {
+                        out[j * self.free + k] += design[(i, k)] * g;
+                    }
                 }
             }
         }
         out
     }
+}
 
+impl TreeModel {
     /// Factor of a joint column, with the sign function rounded so that it has a derivative.
     fn factor(&self, joint: usize, term: JointTerm, state: [f64; 3]) -> f64 {
         match term {

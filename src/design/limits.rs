@@ -29,6 +29,8 @@ pub struct Limits {
     grid: Vec<Vec<Vec<f64>>>,
     bands: Vec<Vec<Band>>,
     omega: f64,
+    /// posture of rest, where it is not the middle of the ranges
+    home: Option<Vec<f64>>,
 }
 
 /// Memory for [`extrema_fast`].
@@ -114,7 +116,20 @@ impl Limits {
             table,
             grid,
             bands,
+            home: None,
         }
+    }
+
+    /// The same with another posture of rest, where it lies inside the ranges.
+    pub fn resting(mut self, home: &[f64]) -> Self {
+        let inside = |(j, x): (usize, &f64)| {
+            let mut bands = self.bands[j].iter().filter(|b| b.order == 0);
+            bands.all(|b| *x > b.low && *x < b.high)
+        };
+        if home.len() == self.bands.len() && home.iter().enumerate().all(inside) {
+            self.home = Some(home.to_vec());
+        }
+        self
     }
 
     /// Series of joint `j`.
@@ -238,6 +253,9 @@ impl Limits {
     pub fn rest(&self, j: usize) -> f64 {
         if let Some(start) = &self.basis.start {
             return start[j];
+        }
+        if let Some(home) = &self.home {
+            return home[j];
         }
         match self.bands[j].iter().find(|b| b.order == 0) {
             Some(b) if b.low.is_finite() && b.high.is_finite() => 0.5 * (b.low + b.high),

@@ -13,9 +13,12 @@
 //! numbers and rounds are compared in a fixed order, so the result is the same for the same seed
 //! whatever the number of threads, unless a time limit ends the run.
 
+mod closed;
+mod closed_limits;
 pub mod criterion;
 pub mod information;
 pub mod limits;
+pub mod path;
 pub mod record;
 pub mod settings;
 pub mod solve;
@@ -30,11 +33,15 @@ use crate::base::BaseParameters;
 use crate::dynamics::Tree;
 use crate::error::{Error, Result, Warning};
 use crate::identifiability::{certificate, torque_noise};
+use crate::mechanism::{Mechanism, closed_certificate};
+use crate::plant::Plant;
 use crate::robot::{JointTerm, Motion, Robot};
-use crate::trajectory::{Basis, Trajectory};
+use crate::trajectory::{Basis, Fourier, Trajectory};
+use closed_limits::ClosedLimits;
 use criterion::Objective;
 use information::Information;
 use limits::Limits;
+use path::PathLimits;
 use rayon::prelude::*;
 use solve::{Iterate, Phase, Stop, Task};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -141,107 +148,256 @@ pub fn design(
 ) -> Result<Design> {
     settings.check(robot)?;
     let begin = Instant::now();
-    let (starts, time_limit) = settings.budget();
-    let deadline = begin + Duration::from_secs_f64(time_limit.min(1e8));
     let robot = with_assumed_limits(robot);
     let base = BaseParameters::new(&robot)?;
-    if base.count() == 0 {
-        return Err(Error::Infeasible(format!(
-            "{}: no parameter can be identified from joint torques, so there is nothing to excite; \
-             check gravity, axes and `identify`",
-            robot.name
-        )));
-    }
-    let harmonics = settings.grid.harmonics(settings.harmonics, settings.seed);
-    let basis = Basis::new(
-        &harmonics,
-        settings.ends,
-        robot.dof(),
-        settings.start.as_deref(),
-    )?;
-    let count = samples(&robot, &harmonics);
-    let transform = match settings.condition {
-        Condition::Invariant => base.row_space.clone(),
-        _ => base.selection(),
-    };
+    something_to_identify(&robot.name, &base)?;
+    let basis = basis(&robot, settings)?;
+    let count = samples(&robot, &basis.harmonics);
     let noise = torque_noise(&robot).0;
     let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
+    let transform = transform(&base, settings);
     let info = Information::new(&robot, &basis, settings.period, count, transform, weights);
-    let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
     let torque = TorqueLimits::new(&robot, settings.derate);
-    let scale = start::scales(&robot, settings.period);
-    let objective = Objective {
-        criterion: settings.criterion,
-        condition: settings.condition,
-    };
-    let task = Task {
-        info: &info,
-        objective,
-        limits: &limits,
-        torque: torque.as_ref(),
-        scale: &scale,
-        deadline: time_limit.is_finite().then_some(deadline),
-    };
-
-    let halt = || interrupt.load(Ordering::Relaxed) || Instant::now() >= deadline;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(settings.threads)
-        .build()
-        .map_err(|e| Error::Argument(format!("threads: {e}")))?;
-    let source = start::Source {
+    let mut derated = robot.clone();
+    for joint in &mut derated.joints {
+        joint.limits.effort *= settings.derate;
+    }
+    let tree = Tree::new(&robot);
+    Problem {
         robot: &robot,
+        settings,
         basis: &basis,
-        task: &task,
-        seed: settings.seed,
-    };
-    let mut search = Search::default();
-    pool.install(|| -> Result<()> {
-        while search.next < starts && (search.best.is_none() || !halt()) {
-            search.round(&source, starts, &halt, &|done, best| {
-                progress(Progress {
-                    starts: done,
-                    planned: (starts < usize::MAX).then_some(starts),
-                    best: best.exp(),
-                    seconds: begin.elapsed().as_secs_f64(),
-                });
-            })?;
+        info: &info,
+        limits: Limits::new(&robot, &basis, settings.period, settings.derate),
+        path: torque.as_ref().map(|t| t as &dyn PathLimits),
+        certified: &|fourier| Ok(certificate(&derated, &tree, fourier)?.satisfied),
+    }
+    .solve(begin, interrupt, progress)
+}
+
+/// Designs an exciting trajectory of either kind of robot, see [`design`] and [`design_closed`].
+///
+/// # Errors
+/// As these.
+pub fn design_plant(
+    plant: &Plant,
+    settings: &Settings,
+    interrupt: &AtomicBool,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design> {
+    match plant {
+        Plant::Serial(robot) => design(robot, settings, interrupt, progress),
+        Plant::Parallel(mechanism) => design_closed(mechanism, settings, interrupt, progress),
+    }
+}
+
+/// Designs an exciting trajectory of the platform of a closed chain: a Fourier series for each task
+/// coordinate, inside the workspace box and the limits of actuators, passive joints and
+/// singularities. [`Design::robot`] has the task coordinates as its joints.
+///
+/// # Errors
+/// As [`design`].
+pub fn design_closed(
+    mechanism: &Mechanism,
+    settings: &Settings,
+    interrupt: &AtomicBool,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Design> {
+    let robot = mechanism.task_robot();
+    settings.check(&robot)?;
+    let begin = Instant::now();
+    let base = mechanism.base()?;
+    something_to_identify(&robot.name, &base)?;
+    let basis = basis(&robot, settings)?;
+    let count = samples(&mechanism.robot, &basis.harmonics);
+    let noise = torque_noise(&mechanism.actuator_robot()).0;
+    let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
+    let transform = transform(&base, settings);
+    let info = Information::closed(
+        mechanism,
+        &basis,
+        settings.period,
+        count,
+        transform,
+        weights,
+    );
+    let path = ClosedLimits::new(mechanism, settings.derate, settings.period, count);
+    let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
+    Problem {
+        robot: &robot,
+        settings,
+        basis: &basis,
+        info: &info,
+        limits: limits.resting(&mechanism.home),
+        path: Some(&path),
+        certified: &|fourier| Ok(closed_certificate(mechanism, fourier, settings.derate)?.satisfied),
+    }
+    .solve(begin, interrupt, progress)
+}
+
+fn something_to_identify(name: &str, base: &BaseParameters) -> Result<()> {
+    match base.count() {
+        0 => Err(Error::Infeasible(format!(
+            "{name}: no parameter can be identified from actuator torques, so there is nothing to \
+             excite; check gravity, axes and `identify`"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn basis(robot: &Robot, settings: &Settings) -> Result<Basis> {
+    let harmonics = settings.grid.harmonics(settings.harmonics, settings.seed);
+    let start = settings.start.as_deref();
+    Basis::new(&harmonics, settings.ends, robot.dof(), start)
+}
+
+/// `B` of the matrix that the settings ask for.
+fn transform(base: &BaseParameters, settings: &Settings) -> faer::Mat<f64> {
+    match settings.condition {
+        Condition::Invariant => base.row_space.clone(),
+        _ => base.selection(),
+    }
+}
+
+/// One problem of either kind.
+struct Problem<'a> {
+    /// what the series move, with its limits
+    robot: &'a Robot,
+    settings: &'a Settings,
+    basis: &'a Basis,
+    info: &'a Information<'a>,
+    limits: Limits,
+    path: Option<&'a dyn PathLimits>,
+    /// whether a motion keeps all limits for all time
+    certified: &'a dyn Fn(&Fourier) -> Result<bool>,
+}
+
+impl Problem<'_> {
+    fn solve(
+        &self,
+        begin: Instant,
+        interrupt: &AtomicBool,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Design> {
+        let settings = self.settings;
+        let (starts, time_limit) = settings.budget();
+        let deadline = begin + Duration::from_secs_f64(time_limit.min(1e8));
+        let scale = start::scales(self.robot, settings.period);
+        let objective = Objective {
+            criterion: settings.criterion,
+            condition: settings.condition,
+        };
+        let task = Task {
+            info: self.info,
+            objective,
+            limits: &self.limits,
+            path: self.path,
+            scale: &scale,
+            deadline: time_limit.is_finite().then_some(deadline),
+        };
+        let halt = || interrupt.load(Ordering::Relaxed) || Instant::now() >= deadline;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(settings.threads)
+            .build()
+            .map_err(|e| Error::Argument(format!("threads: {e}")))?;
+        let source = start::Source {
+            robot: self.robot,
+            basis: self.basis,
+            task: &task,
+            seed: settings.seed,
+        };
+        let mut search = Search::default();
+        pool.install(|| -> Result<()> {
+            while search.next < starts && (search.best.is_none() || !halt()) {
+                search.round(&source, starts, &halt, &|done, best| {
+                    progress(Progress {
+                        starts: done,
+                        planned: (starts < usize::MAX).then_some(starts),
+                        best: best.exp(),
+                        seconds: begin.elapsed().as_secs_f64(),
+                    });
+                })?;
+                if search.best.is_none() && search.next >= 8 * ROUND.0 {
+                    break;
+                }
+            }
+            Ok(())
+        })?;
+        let status = match (interrupt.load(Ordering::Relaxed), halt()) {
+            (true, _) => Status::Interrupted,
+            (_, true) => Status::TimeLimit,
+            _ => Status::Converged,
+        };
+        let Some((best, iterate)) = search.best else {
+            return Err(Error::Infeasible(self.infeasible()));
+        };
+        let fourier = self.settle(iterate.x)?;
+        let trajectory = Trajectory {
+            periods: settings.periods,
+            ends: settings.ends,
+            grid: settings.grid,
+            settings: serde_json::to_value(settings).unwrap_or_default(),
+            ..Trajectory::new(self.robot, fourier)
+        };
+        let record = Record {
+            settings: settings.clone(),
+            status,
+            starts: search.starts,
+            best,
+            seconds: begin.elapsed().as_secs_f64(),
+        };
+        Ok(Design {
+            robot: self.robot.clone(),
+            trajectory,
+            value: iterate.value.exp(),
+            record,
+        })
+    }
+
+    /// Rounds off: end conditions to the last digit, and the motion shrunk about its rest by
+    /// thousandths while the certificate, what happens between the samples included, finds
+    /// anything.
+    fn settle(&self, mut x: Vec<f64>) -> Result<Fourier> {
+        let m = self.basis.free();
+        for _ in 0..200 {
+            let fourier = self.basis.fourier(self.settings.period, &x);
+            if (self.certified)(&fourier)? {
+                return Ok(fourier);
+            }
+            for j in 0..self.robot.dof() {
+                let rest = self.limits.rest_parameters(j);
+                let x_j = &mut x[j * m..(j + 1) * m];
+                x_j.iter_mut()
+                    .zip(rest)
+                    .for_each(|(x, r)| *x = r + 0.998 * (*x - r));
+            }
         }
-        Ok(())
-    })?;
-    let status = match (interrupt.load(Ordering::Relaxed), halt()) {
-        (true, _) => Status::Interrupted,
-        (_, true) => Status::TimeLimit,
-        _ => Status::Converged,
-    };
-    let Some((best, iterate)) = search.best else {
-        return Err(Error::Infeasible(infeasible(
-            &robot,
-            torque.as_ref(),
-            &info,
-            &limits,
-        )));
-    };
-    let fourier = settle(&robot, settings, &basis, &limits, iterate.x)?;
-    let trajectory = Trajectory {
-        periods: settings.periods,
-        ends: settings.ends,
-        grid: settings.grid,
-        settings: serde_json::to_value(settings).unwrap_or_default(),
-        ..Trajectory::new(&robot, fourier)
-    };
-    let record = Record {
-        settings: settings.clone(),
-        status,
-        starts: search.starts,
-        best,
-        seconds: begin.elapsed().as_secs_f64(),
-    };
-    Ok(Design {
-        robot,
-        trajectory,
-        value: iterate.value.exp(),
-        record,
-    })
+        Ok(self.basis.fourier(self.settings.period, &x))
+    }
+
+    /// Why there is no feasible trajectory.
+    fn infeasible(&self) -> String {
+        let rest: Vec<f64> = (0..self.robot.dof())
+            .flat_map(|j| self.limits.rest_parameters(j))
+            .collect();
+        let mut motion = Default::default();
+        self.info.sample(&rest, &mut motion);
+        let broken = match self.path {
+            Some(path) => path.broken(self.info, &motion),
+            None => String::new(),
+        };
+        match broken.is_empty() {
+            false => format!(
+                "{}: no feasible trajectory: at rest in the middle of its range {broken}; check \
+                 masses, gravity, the limit, or choose a start posture",
+                self.robot.name
+            ),
+            true => format!(
+                "{}: no feasible trajectory was found; check the limits and the start posture",
+                self.robot.name
+            ),
+        }
+    }
 }
 
 /// Samples of a period in the optimiser: enough for the harmonics that trigonometric functions of
@@ -333,69 +489,4 @@ impl Search {
         }
         Ok(())
     }
-}
-
-/// Rounds off: end conditions to the last digit, and the motion shrunk about its rest by
-/// thousandths while the certificate, torques between the samples included, finds anything.
-fn settle(
-    robot: &Robot,
-    settings: &Settings,
-    basis: &Basis,
-    limits: &Limits,
-    mut x: Vec<f64>,
-) -> Result<crate::trajectory::Fourier> {
-    let mut derated = robot.clone();
-    for joint in &mut derated.joints {
-        joint.limits.effort *= settings.derate;
-    }
-    let tree = Tree::new(robot);
-    let m = basis.free();
-    for attempt in 0..200 {
-        let fourier = basis.fourier(settings.period, &x);
-        if attempt == 199 || certificate(&derated, &tree, &fourier)?.satisfied {
-            return Ok(fourier);
-        }
-        for j in 0..robot.dof() {
-            let rest = limits.rest_parameters(j);
-            let x_j = &mut x[j * m..(j + 1) * m];
-            x_j.iter_mut()
-                .zip(rest)
-                .for_each(|(x, r)| *x = r + 0.998 * (*x - r));
-        }
-    }
-    Ok(basis.fourier(settings.period, &x))
-}
-
-/// Why there is no feasible trajectory.
-fn infeasible(
-    robot: &Robot,
-    torque: Option<&TorqueLimits>,
-    info: &Information,
-    limits: &Limits,
-) -> String {
-    let rest: Vec<f64> = (0..robot.dof())
-        .flat_map(|j| limits.rest_parameters(j))
-        .collect();
-    if let Some(t) = torque {
-        let mut motion = Default::default();
-        let mut tau = Vec::new();
-        info.sample(&rest, &mut motion);
-        t.torques(info, &motion, &mut Default::default(), &mut tau);
-        let (used, j) = t.worst(&tau);
-        if used > 1.0 {
-            return format!(
-                "{}: no feasible trajectory: at rest in the middle of its range {} already needs \
-                 {:.0} % of its effort limit ({} N m or N); check masses, gravity, the limit, or \
-                 choose a start posture",
-                robot.name,
-                robot.joints[j].name,
-                100.0 * used,
-                robot.joints[j].limits.effort
-            );
-        }
-    }
-    format!(
-        "{}: no feasible trajectory was found; check the limits and the start posture",
-        robot.name
-    )
 }

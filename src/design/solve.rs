@@ -1,13 +1,13 @@
 //! Sequential convex programming from one start.
 //!
 //! At a feasible `x` the criterion is modelled, the limits are rows that hold exactly or to second
-//! order, torques are linearised, and clarabel solves the conic program in the scaled step
+//! order, limits along the path are linearised, and clarabel solves the conic program in the scaled step
 //! `z_k = δ_k / s_k`
 //!
 //! ```text
 //! minimise   gᵀz + ½(a − b) + ½ zᵀ(B + μ 1) z
 //! subject to a 1 ⪰ U_0 + Σ z_k U_k,   L_0 + Σ z_k L_k ⪰ b 1,
-//!            limits(x + δ),   |τ + ∂τ δ| ≤ τ_max
+//!            limits(x + δ),   h + ∂h δ ≤ 1
 //! ```
 //!
 //! in two phases. First the extreme eigenvalues are smoothed by p-norms, `g` is their exact
@@ -25,9 +25,8 @@
 use super::criterion::{Cluster, Criterion, Model, Objective};
 use super::information::{Evaluation, Information};
 use super::limits::{ExtremaWork, Limits, Row};
-use super::torque::TorqueLimits;
+use super::path::{PathLimits, PathMemory, PathRow};
 use crate::conic::{Problem, Settings as ConicSettings};
-use crate::dynamics::Workspace;
 use crate::error::Result;
 use faer::Mat;
 use std::time::Instant;
@@ -35,13 +34,13 @@ use std::time::Instant;
 /// One start's problem: all parts are shared between threads.
 pub struct Task<'a> {
     /// information matrix and derivatives
-    pub info: &'a Information,
+    pub info: &'a Information<'a>,
     /// what is minimised
     pub objective: Objective,
     /// joint limits
     pub limits: &'a Limits,
-    /// torque limits
-    pub torque: Option<&'a TorqueLimits>,
+    /// limits along the path: torques, actuators of closed chains
+    pub path: Option<&'a dyn PathLimits>,
     /// size of a unit step of each joint in `x`
     pub scale: &'a [f64],
     /// when a conic solve is broken off
@@ -205,14 +204,14 @@ struct Point {
     merit: f64,
     value: f64,
     model: Model,
-    torque_rows: Vec<super::torque::TorqueRow>,
+    path_rows: Vec<PathRow>,
 }
 
 /// A step of the subproblem.
 struct Step {
     x: Vec<f64>,
     predicted: f64,
-    /// whether the true torques fit
+    /// whether the limits along the path hold
     fits: bool,
 }
 
@@ -220,8 +219,7 @@ struct Step {
 struct State {
     evaluation: Evaluation,
     work: ExtremaWork,
-    workspace: Workspace,
-    tau: Vec<f64>,
+    path: PathMemory,
     problem: Problem,
 }
 
@@ -230,8 +228,7 @@ impl State {
         State {
             evaluation: Evaluation::default(),
             work: ExtremaWork::default(),
-            workspace: Workspace::default(),
-            tau: Vec::new(),
+            path: PathMemory::default(),
             problem: Problem::new(task.info.len() + 2),
         }
     }
@@ -268,7 +265,7 @@ impl State {
         for c in [&mut model.upper, &mut model.lower].into_iter().flatten() {
             c.gradients.iter_mut().for_each(scale);
         }
-        let torque_rows = match task.torque {
+        let path_rows = match task.path {
             Some(limits) => limits.rows(task.info, e, 0.8),
             None => Vec::new(),
         };
@@ -276,7 +273,7 @@ impl State {
             merit,
             value,
             model,
-            torque_rows,
+            path_rows,
         })
     }
 
@@ -317,7 +314,7 @@ impl State {
             let free =
                 f64::from(here.model.lower.is_some()) - f64::from(here.model.upper.is_some());
             let predicted = -(solution.objective + 0.5 * free);
-            let fits = self.fit_torques(task, x, &mut next);
+            let fits = self.fit_path(task, x, &mut next);
             return Ok(Some(Step {
                 x: next,
                 predicted,
@@ -370,27 +367,21 @@ impl State {
                 .map(|(k, r)| (row.joint * m + k, r * s));
             p.inequality(entries, row.slack);
         }
-        for row in &here.torque_rows {
-            let sign = row.value.signum();
-            let entries = row
-                .gradient
-                .iter()
-                .enumerate()
-                .map(|(k, g)| (k, sign * g * task.scale[k / m]));
-            p.inequality(entries, 0.997 * row.limit - row.value.abs());
+        for row in &here.path_rows {
+            let scaled = row.gradient.iter().enumerate();
+            p.inequality(scaled.map(|(k, g)| (k, g * task.scale[k / m])), row.slack);
         }
     }
 
-    /// Goes back along the step until the true torques fit; false if they do not.
-    fn fit_torques(&mut self, task: &Task, x: &[f64], next: &mut [f64]) -> bool {
-        let Some(limits) = task.torque else {
+    /// Goes back along the step until the limits along the path hold; false if they do not.
+    fn fit_path(&mut self, task: &Task, x: &[f64], next: &mut [f64]) -> bool {
+        let Some(limits) = task.path else {
             return true;
         };
         for _ in 0..10 {
             let motion = &mut self.evaluation.motion;
             task.info.sample(next, motion);
-            limits.torques(task.info, motion, &mut self.workspace, &mut self.tau);
-            if limits.worst(&self.tau).0 <= 1.0 {
+            if limits.used(task.info, motion, &mut self.path) <= 1.0 {
                 return true;
             }
             next.iter_mut()

@@ -2,6 +2,7 @@
 
 use super::information::Evaluation;
 use super::limits::ExtremaWork;
+use super::path::PathMemory;
 use super::solve::Task;
 use crate::dynamics::Samples;
 use crate::robot::{Motion, Robot};
@@ -91,14 +92,14 @@ impl Source<'_> {
         self.task
             .limits
             .pull_inside(&mut next, &mut ExtremaWork::default());
-        self.fit_torques(&next, x).unwrap_or_else(|| x.to_vec())
+        self.fit_path(&next, x).unwrap_or_else(|| x.to_vec())
     }
 
     /// A random trajectory inside the limits.
     ///
     /// Amplitudes fall with the harmonic, the middle of the motion lies near the middle of the
     /// range, and the motion of each joint is scaled to the limit that it meets first, times a
-    /// random factor; then all joints are shrunk until the torques fit. `None` where they do not
+    /// random factor; then all joints are shrunk until the limits along the path hold. `None` where they do not
     /// fit even at rest.
     fn candidate(&self, rng: &mut ChaCha8Rng) -> Option<Vec<f64>> {
         let (basis, limits) = (self.basis, self.task.limits);
@@ -127,15 +128,15 @@ impl Source<'_> {
             x.extend((0..m).map(|k| still[k] + factor * (full[k] - still[k])));
             rest.extend(still);
         }
-        self.fit_torques(&x, &rest)
+        self.fit_path(&x, &rest)
     }
 
-    /// The largest of a few steps from a feasible trajectory towards another whose torques fit.
-    fn fit_torques(&self, x: &[f64], from: &[f64]) -> Option<Vec<f64>> {
-        let Some(limits) = self.task.torque else {
+    /// The largest of a few steps from a feasible trajectory towards another that keeps the limits along the path.
+    fn fit_path(&self, x: &[f64], from: &[f64]) -> Option<Vec<f64>> {
+        let Some(limits) = self.task.path else {
             return Some(x.to_vec());
         };
-        let (mut motion, mut ws, mut tau) = (Samples::default(), Default::default(), Vec::new());
+        let (mut motion, mut memory) = (Samples::default(), PathMemory::default());
         let mut fraction = 1.0;
         for attempt in 0..30 {
             let trial: Vec<f64> = x
@@ -144,8 +145,7 @@ impl Source<'_> {
                 .map(|(x, r)| r + fraction * (x - r))
                 .collect();
             self.task.info.sample(&trial, &mut motion);
-            limits.torques(self.task.info, &motion, &mut ws, &mut tau);
-            if limits.worst(&tau).0 <= 1.0 {
+            if limits.used(self.task.info, &motion, &mut memory) <= 1.0 {
                 return Some(trial);
             }
             fraction = if attempt == 28 { 0.0 } else { fraction * 0.8 };

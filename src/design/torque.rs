@@ -5,6 +5,7 @@
 //! each joint.
 
 use super::information::{Evaluation, Information};
+use super::path::{PathLimits, PathMemory, PathRow, ROOM};
 use crate::dynamics::{Derivatives, Samples, Workspace};
 use crate::robot::{JointTerm, Robot};
 
@@ -13,23 +14,9 @@ use crate::robot::{JointTerm, Robot};
 pub struct TorqueLimits {
     phi: Vec<f64>,
     terms: Vec<[f64; 4]>,
+    names: Vec<String>,
     /// limit less Coulomb friction, per joint
     room: Vec<f64>,
-}
-
-/// Torque at a sample, linear in a step of all free numbers.
-#[derive(Debug, Clone)]
-pub struct TorqueRow {
-    /// joint
-    pub joint: usize,
-    /// sample
-    pub sample: usize,
-    /// torque now
-    pub value: f64,
-    /// its limit
-    pub limit: f64,
-    /// gradient with respect to `x`
-    pub gradient: Vec<f64>,
 }
 
 /// Room kept at the samples for what happens between them, as a fraction of the limit.
@@ -44,6 +31,7 @@ impl TorqueLimits {
         Some(TorqueLimits {
             phi: robot.bodies.iter().flat_map(|b| b.inertia.0).collect(),
             terms: robot.joints.iter().map(|j| j.terms).collect(),
+            names: robot.joint_names(),
             room: robot
                 .joints
                 .iter()
@@ -92,9 +80,32 @@ impl TorqueLimits {
         }
         worst
     }
+}
 
-    /// Linearised torques that use more than `from` of their limit, at an evaluated point.
-    pub fn rows(&self, info: &Information, e: &mut Evaluation, from: f64) -> Vec<TorqueRow> {
+impl PathLimits for TorqueLimits {
+    fn used(&self, info: &Information, motion: &Samples, memory: &mut PathMemory) -> f64 {
+        let mut tau = std::mem::take(&mut memory.tau);
+        self.torques(info, motion, &mut memory.workspace, &mut tau);
+        let used = self.worst(&tau).0;
+        memory.tau = tau;
+        used
+    }
+
+    fn broken(&self, info: &Information, motion: &Samples) -> String {
+        let mut tau = Vec::new();
+        self.torques(info, motion, &mut Workspace::default(), &mut tau);
+        let (used, j) = self.worst(&tau);
+        match used > 1.0 {
+            true => format!(
+                "{} already needs {:.0} % of its effort limit",
+                self.names[j],
+                100.0 * used
+            ),
+            false => String::new(),
+        }
+    }
+
+    fn rows(&self, info: &Information, e: &mut Evaluation, from: f64) -> Vec<PathRow> {
         let (count, dof) = (e.motion.count, e.motion.dof);
         let step = count * dof;
         let mut tau = Vec::new();
@@ -122,12 +133,16 @@ impl TorqueLimits {
                 d.qdd[j * count + i] += self.terms[j][JointTerm::Armature as usize];
             }
             for i in near {
-                rows.push(TorqueRow {
-                    joint: j,
-                    sample: i,
-                    value: tau[j * count + i],
-                    limit: self.room[j],
-                    gradient: info.pull_back(&d, i),
+                let at = |g: &[f64]| -> Vec<f64> { (0..dof).map(|c| g[c * count + i]).collect() };
+                let (q, qd, qdd) = (at(&d.q), at(&d.qd), at(&d.qdd));
+                let mut gradient = info.pull_back(i, [&q, &qd, &qdd]);
+                let value = tau[j * count + i];
+                if value < 0.0 {
+                    gradient.iter_mut().for_each(|g| *g = -*g);
+                }
+                rows.push(PathRow {
+                    gradient,
+                    slack: (1.0 - ROOM) * self.room[j] - value.abs(),
                 });
             }
         }

@@ -38,6 +38,14 @@ impl Delta {
     /// Other than three chains, lengths that are not positive, a home out of reach, and what
     /// [`Mechanism::new`] finds.
     pub fn build(&self) -> Result<Mechanism> {
+        Mechanism::new(self.setup()?)
+    }
+
+    /// What the mechanism is put together from.
+    ///
+    /// # Errors
+    /// As [`Self::build`], what [`Mechanism::new`] finds excepted.
+    pub fn setup(&self) -> Result<Setup> {
         let bad = |why: String| Err(Error::Infeasible(format!("{}: {why}", self.name)));
         if self.chains.len() != 3 {
             return bad(format!(
@@ -63,7 +71,7 @@ impl Delta {
             .iter()
             .map(|c| c.arm_length)
             .fold(0.0, f64::max);
-        Mechanism::new(Setup {
+        Ok(Setup {
             kind: "delta",
             robot: tree.robot(&self.name, self.gravity),
             actuated: (0..3).collect(),

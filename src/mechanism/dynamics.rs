@@ -57,6 +57,16 @@ pub struct ClosedWorkspace {
     curvature: Vec<f64>,
     part: Samples,
     raw: Vec<f64>,
+    terms: Vec<(usize, JointTerm, f64)>,
+    /// rate over which `sign(q̇)` of each coordinate is rounded in [`Mechanism::gradients`], so that
+    /// Coulomb friction has a derivative; empty: it is constant between changes of sign
+    pub sign_width: Vec<f64>,
+}
+
+/// `sign(v)` rounded over `w`: `v/√(v² + w²)`, and its derivative.
+pub(crate) fn rounded_sign(v: f64, w: f64) -> [f64; 2] {
+    let size = v * v + w * w;
+    [v / size.sqrt(), w * w / size.powf(1.5)]
 }
 
 /// Gradients by the task coordinates and their two derivatives: parameter vector `v`, task
@@ -532,6 +542,60 @@ impl Mechanism {
         Ok(self.project(&motion, &gamma))
     }
 
+    /// Motion of all joints, and `G`, into the memory ([`ClosedWorkspace::motion`]).
+    ///
+    /// # Errors
+    /// As [`Mechanism::motion`].
+    pub fn evaluate_motion(&self, ws: &mut ClosedWorkspace, x: &Samples) -> Result<()> {
+        let isa = ws.tree.isa();
+        self.motion_into(isa, x, &mut ws.motion)
+    }
+
+    /// Actuator forces of the nominal model along the motion in the memory, in two halves: without
+    /// Coulomb friction, and the most that Coulomb friction of any sign can add,
+    /// `Σ_j |G_ja| F_c,j`. Each actuator-major.
+    pub fn smooth_force(&self, ws: &mut ClosedWorkspace, force: &mut Vec<f64>) {
+        let ClosedWorkspace {
+            tree,
+            motion,
+            phi,
+            torque,
+            ..
+        } = ws;
+        let (na, count) = (self.actuators(), motion.tree.count);
+        phi.clear();
+        phi.extend(self.robot.bodies.iter().flat_map(|b| b.inertia.0));
+        torque.clear();
+        torque.resize(motion.tree.dof * count, 0.0);
+        self.tree.inverse_dynamics(tree, phi, &motion.tree, torque);
+        for (j, joint) in self.robot.joints.iter().enumerate() {
+            let [armature, viscous, _, offset] = joint.terms;
+            if armature != 0.0 || viscous != 0.0 || offset != 0.0 {
+                for s in 0..count {
+                    let [_, qd, qdd] = motion.tree.at(j, s);
+                    torque[j * count + s] += armature * qdd + viscous * qd + offset;
+                }
+            }
+        }
+        force.clear();
+        force.resize(2 * na * count, 0.0);
+        let (smooth, friction) = force.split_at_mut(na * count);
+        contract(&motion.g, torque, motion.tree.dof, na, count, smooth);
+        for (j, joint) in self.robot.joints.iter().enumerate() {
+            let coulomb = joint.terms[JointTerm::Coulomb as usize].abs();
+            if coulomb == 0.0 {
+                continue;
+            }
+            for a in 0..na {
+                let g = &motion.g[(j * na + a) * count..][..count];
+                let own = self.own_row(j, a);
+                for (to, g) in friction[a * count..][..count].iter_mut().zip(g) {
+                    *to += coulomb * own.unwrap_or(*g).abs();
+                }
+            }
+        }
+    }
+
     /// Adds the terms of raw parameters to the torques of the tree.
     fn add_terms(&self, motion: &ClosedMotion, raw: &[f64], gamma: &mut [f64]) {
         let count = motion.tree.count;
@@ -563,7 +627,7 @@ impl Mechanism {
     /// For each of the raw parameter vectors `φ_v` (one after another in `raw`) and rates `r_v` of
     /// the actuators the gradient of `Σ_a r_va τ_a(x, ẋ, ẍ; φ_v)`, see the head of this file.
     /// `rates` holds vector `v`, actuator `a`, sample `s` at `(v·actuators + a)·count + s`. Known
-    /// bodies do not count; Coulomb friction counts as constant between changes of sign.
+    /// bodies do not count; Coulomb friction is rounded by [`ClosedWorkspace::sign_width`].
     ///
     /// # Errors
     /// As [`Mechanism::motion`].
@@ -578,11 +642,61 @@ impl Mechanism {
         rates: &[f64],
         out: &mut TaskDerivatives,
     ) -> Result<()> {
+        let each = self.parameters.raw_count();
+        ws.phi.clear();
+        ws.terms.clear();
+        for raw in raw.chunks_exact(each.max(1)) {
+            self.tree_phi(raw, false, &mut ws.phi);
+            let values = &raw[10 * self.parameters.bodies.len()..];
+            let terms = self.parameters.terms.iter().zip(values);
+            ws.terms
+                .extend(terms.map(|(&(joint, term), &value)| (joint, term, value)));
+        }
+        let vectors = raw.len() / each.max(1);
+        self.gradients_of(ws, vectors, x, rates, out)
+    }
+
+    /// As [`Mechanism::gradients`], with `vectors` times the nominal model: known bodies and all
+    /// joint terms count.
+    ///
+    /// # Errors
+    /// As [`Mechanism::motion`].
+    ///
+    /// # Panics
+    /// If `rates` is too short.
+    pub fn nominal_gradients(
+        &self,
+        ws: &mut ClosedWorkspace,
+        vectors: usize,
+        x: &Samples,
+        rates: &[f64],
+        out: &mut TaskDerivatives,
+    ) -> Result<()> {
+        ws.phi.clear();
+        ws.terms.clear();
+        for _ in 0..vectors {
+            ws.phi
+                .extend(self.robot.bodies.iter().flat_map(|b| b.inertia.0));
+            for (j, joint) in self.robot.joints.iter().enumerate() {
+                let terms = JointTerm::ALL.into_iter().zip(joint.terms);
+                ws.terms.extend(terms.map(|(term, value)| (j, term, value)));
+            }
+        }
+        self.gradients_of(ws, vectors, x, rates, out)
+    }
+
+    /// Gradients for the bodies in `ws.phi` and the terms in `ws.terms`, both vector by vector.
+    fn gradients_of(
+        &self,
+        ws: &mut ClosedWorkspace,
+        vectors: usize,
+        x: &Samples,
+        rates: &[f64],
+        out: &mut TaskDerivatives,
+    ) -> Result<()> {
         let isa = ws.tree.isa();
         self.motion_into(isa, x, &mut ws.motion)?;
         let (n, m, na, count) = (self.robot.dof(), self.freedoms(), self.actuators(), x.count);
-        let each = self.parameters.raw_count();
-        let vectors = raw.len() / each.max(1);
         assert!(rates.len() >= vectors * na * count, "rates do not fit");
         for a in &mut ws.d {
             a.resize(n * m * count, 0.0);
@@ -592,13 +706,11 @@ impl Mechanism {
         let motion = &ws.motion;
 
         // virtual motion of the tree, and the gradients of the tree along it
-        ws.phi.clear();
         ws.rates.clear();
         ws.rates.resize(vectors * n * count, 0.0);
         ws.u.clear();
         ws.u.resize(vectors * m * count, 0.0);
         for v in 0..vectors {
-            self.tree_phi(&raw[v * each..(v + 1) * each], false, &mut ws.phi);
             let r = &rates[v * na * count..(v + 1) * na * count];
             let tree = &mut ws.rates[v * n * count..(v + 1) * n * count];
             spread(&motion.g, r, n, na, count, tree);
@@ -618,28 +730,38 @@ impl Mechanism {
         }
         ws.torque.resize(n * count, 0.0);
         ws.curvature.resize(n * m * count, 0.0);
+        let terms_each = ws.terms.len() / vectors.max(1);
         for v in 0..vectors {
             let block = |len: usize| v * len * count..(v + 1) * len * count;
-            let raw = &raw[v * each..(v + 1) * each];
+            let terms = &ws.terms[v * terms_each..(v + 1) * terms_each];
             let tree_rates = &ws.rates[block(n)];
             let (gq, gqd, gqdd) = (
                 &ws.derivatives.q[block(n)],
                 &mut ws.derivatives.qd[block(n)],
                 &mut ws.derivatives.qdd[block(n)],
             );
-            for (&(joint, term), value) in self
-                .parameters
-                .terms
-                .iter()
-                .zip(&raw[10 * self.parameters.bodies.len()..])
-            {
-                let to = match term {
-                    JointTerm::Armature => &mut *gqdd,
-                    JointTerm::Viscous => &mut *gqd,
-                    JointTerm::Coulomb | JointTerm::Offset => continue,
-                };
-                for s in 0..count {
-                    to[joint * count + s] += value * tree_rates[joint * count + s];
+            for &(joint, term, value) in terms {
+                let row = joint * count..(joint + 1) * count;
+                let r = &tree_rates[row.clone()];
+                match term {
+                    JointTerm::Armature => {
+                        let to = gqdd[row].iter_mut().zip(r);
+                        to.for_each(|(g, r)| *g += value * r);
+                    }
+                    JointTerm::Viscous => {
+                        let to = gqd[row].iter_mut().zip(r);
+                        to.for_each(|(g, r)| *g += value * r);
+                    }
+                    JointTerm::Coulomb => {
+                        let Some(&w) = ws.sign_width.get(joint) else {
+                            continue;
+                        };
+                        let to = gqd[row.clone()].iter_mut().zip(r);
+                        for ((g, r), qd) in to.zip(&motion.tree.qd[row]) {
+                            *g += value * r * rounded_sign(*qd, w)[1];
+                        }
+                    }
+                    JointTerm::Offset => {}
                 }
             }
             let (ox, oxd, oxdd) = (
@@ -657,11 +779,21 @@ impl Mechanism {
             contract(dqdd, gqdd, n, m, count, ox);
 
             // change of G: λᵀ F_xx[u, ·]
-            let phi = &ws.phi[v * 10 * self.tree.bodies()..];
+            let bodies = 10 * self.tree.bodies();
+            let phi = &ws.phi[v * bodies..(v + 1) * bodies];
             let gamma = &mut ws.torque;
             self.tree
                 .inverse_dynamics(&mut ws.tree, phi, &motion.tree, gamma);
-            self.add_terms(motion, raw, gamma);
+            for &(joint, term, value) in terms {
+                for s in 0..count {
+                    let state = motion.tree.at(joint, s);
+                    let factor = match (term, ws.sign_width.get(joint)) {
+                        (JointTerm::Coulomb, Some(&w)) => rounded_sign(state[1], w)[0],
+                        _ => term_factor(term, state),
+                    };
+                    gamma[joint * count + s] += value * factor;
+                }
+            }
             let tau = self.project(motion, gamma);
             let u = &ws.u[block(m)];
             let redundant = na > m;

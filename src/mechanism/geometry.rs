@@ -30,6 +30,10 @@ impl<S> Coordinates<S> for [S] {
     }
 }
 
+/// Enclosures of a coordinate and its derivatives over a stretch of time, as Taylor coefficients:
+/// position, velocity, half the acceleration, a sixth of the jerk, a 24th of its derivative.
+pub type Path = super::interval::Series<super::interval::Interval, 5>;
+
 /// A line between two points of the mechanism, for pictures and distances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
@@ -110,6 +114,12 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
 
     /// As [`Kinematics::cones`].
     fn cones(&self, x: &[f64]) -> Vec<Cone>;
+
+    /// Taylor coefficients of all tree coordinates over a stretch of time, from enclosures of those
+    /// of the task coordinates; `None` where the kinematics has no closed form.
+    fn enclosure(&self, _x: &[Path]) -> Option<Vec<Path>> {
+        None
+    }
 
     /// Whether each sample starts from the solution of the one before, so that a batch must not be
     /// cut into pieces.
@@ -438,6 +448,11 @@ impl<K: Kinematics, const M: usize> Geometry for Closed<K, M> {
     }
     fn segments(&self, x: &[f64]) -> Vec<Segment> {
         self.0.segments(x)
+    }
+    fn enclosure(&self, x: &[Path]) -> Option<Vec<Path>> {
+        let mut q = vec![Path::constant(f64::NAN); self.0.coordinates()];
+        self.0.inverse::<Path, [Path]>(x, q.as_mut_slice());
+        Some(q)
     }
     fn cones(&self, x: &[f64]) -> Vec<Cone> {
         self.0.cones(x)

@@ -111,6 +111,14 @@ impl GoughStewart {
     /// A leg of no length at home, 6-SPS with legs that are not bodies of revolution, and what
     /// [`Mechanism::new`] finds.
     pub fn build(&self) -> Result<Mechanism> {
+        Mechanism::new(self.setup()?)
+    }
+
+    /// What the mechanism is put together from.
+    ///
+    /// # Errors
+    /// As [`Self::build`], what [`Mechanism::new`] finds excepted.
+    pub fn setup(&self) -> Result<Setup> {
         let n = self.legs.len();
         if n != 6 {
             return Err(Error::Infeasible(format!(
@@ -209,7 +217,7 @@ impl GoughStewart {
         if let Some(why) = kinematics.unreachable(&self.home) {
             return Err(Error::Infeasible(format!("at home {why}")));
         }
-        Mechanism::new(Setup {
+        Ok(Setup {
             kind: "gough-stewart",
             robot: tree.robot(&self.name, self.gravity),
             actuated: (0..6).collect(),

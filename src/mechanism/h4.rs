@@ -106,6 +106,14 @@ impl H4 {
     /// Other than four chains, a chain on a third bar, lengths that are not positive, a home out of
     /// reach, and what [`Mechanism::new`] finds.
     pub fn build(&self) -> Result<Mechanism> {
+        Mechanism::new(self.setup()?)
+    }
+
+    /// What the mechanism is put together from.
+    ///
+    /// # Errors
+    /// As [`Self::build`], what [`Mechanism::new`] finds excepted.
+    pub fn setup(&self) -> Result<Setup> {
         let bad = |why: String| Err(Error::Infeasible(format!("{}: {why}", self.name)));
         if self.chains.len() != 4 {
             return bad(format!(
@@ -175,7 +183,7 @@ impl H4 {
             return bad(format!("at home {why}"));
         }
         let length = self.hinges.iter().map(|h| h.norm()).fold(1e-3, f64::max);
-        Mechanism::new(Setup {
+        Ok(Setup {
             kind: "h4",
             robot,
             actuated: (0..4).collect(),

@@ -18,29 +18,39 @@
 // the functions that are compiled for them
 #![allow(clippy::needless_range_loop)]
 
+pub mod bundled;
+mod certificate;
 pub mod delta;
 mod dynamics;
+pub mod file;
 mod forward;
 pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
+pub mod interval;
+pub mod margins;
+mod motion_file;
 pub mod parallelogram;
 pub mod parameters;
 pub mod scalar;
 mod singularity;
+mod states;
 pub mod task;
 pub mod tree;
 
+pub use certificate::{ClosedCertificate, PosePeak, closed_certificate};
+pub(crate) use dynamics::rounded_sign;
 pub use dynamics::{ClosedMotion, ClosedWorkspace, TaskDerivatives};
 pub use forward::Solution;
-pub use geometry::{Closed, Cone, Coordinates, Geometry, Kinematics, Segment};
-pub use parameters::{Group, Parameter, Parameters, Pattern};
+pub use geometry::{Closed, Cone, Coordinates, Geometry, Kinematics, Path, Segment};
+pub use margins::{Margins, PoseKind, PoseUse};
+pub use parameters::{Group, Parameter, Parameters, Pattern, RawColumn};
 pub use singularity::{SINGULAR, Singularity, Spread};
 pub use task::{PlatformMotion, Task};
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
-use crate::robot::{Limits, Robot};
+use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
 
 /// What a mechanism is put together from.
 #[derive(Debug)]
@@ -85,6 +95,8 @@ pub struct Mechanism {
     pub home: Vec<f64>,
     /// characteristic length, m: an angle of 1 rad counts as this much
     pub length: f64,
+    /// what a motion keeps away from, beside the limits of the actuators
+    pub margins: Margins,
     /// what was imperfect, a home close to a singularity among them
     pub warnings: Vec<Warning>,
     geometry: Box<dyn Geometry>,
@@ -178,11 +190,13 @@ impl Mechanism {
             parameters,
             home,
             length,
+            margins: Margins::default(),
             warnings,
             geometry,
             tree,
         };
         mechanism.check_home()?;
+        mechanism.margins = mechanism.default_margins();
         Ok(mechanism)
     }
 
@@ -264,6 +278,60 @@ impl Mechanism {
     pub fn actuator_positions(&self, x: &[f64]) -> Result<Vec<f64>> {
         let q = self.inverse(x)?;
         Ok(self.actuated.iter().map(|&a| q[a]).collect())
+    }
+
+    /// The task coordinates as the joints of a robot without bodies, their limits the workspace
+    /// box: what trajectories, their limits and their files are about.
+    pub fn task_robot(&self) -> Robot {
+        let joints = self.task_names.iter().enumerate().map(|(k, name)| {
+            let angle = match self.task {
+                Task::Joints(_) => self.robot.joints[self.actuated[k]].motion == Motion::Revolute,
+                _ => self.task.is_angle(k),
+            };
+            let motion = match angle {
+                true => Motion::Revolute,
+                false => Motion::Prismatic,
+            };
+            Joint {
+                limits: self.workspace[k],
+                ..Joint::new(name, motion)
+            }
+        });
+        Robot {
+            joints: joints.collect(),
+            ..self.bodiless()
+        }
+    }
+
+    /// The actuators as the joints of a robot without bodies, in the order of log columns.
+    pub fn actuator_robot(&self) -> Robot {
+        let joints = &self.robot.joints;
+        Robot {
+            joints: self.actuated.iter().map(|&a| joints[a].clone()).collect(),
+            ..self.bodiless()
+        }
+    }
+
+    fn bodiless(&self) -> Robot {
+        Robot {
+            bodies: Vec::new(),
+            joints: Vec::new(),
+            warnings: self.warnings.clone(),
+            name: self.robot.name.clone(),
+            gravity: self.robot.gravity,
+            prior: self.robot.prior,
+            path: self.robot.path.clone(),
+            hash: self.robot.hash.clone(),
+        }
+    }
+
+    /// The same mechanism with other terms of its actuators as unknowns.
+    pub fn with_terms(mut self, terms: &[JointTerm]) -> Self {
+        for &a in &self.actuated {
+            self.robot.joints[a].identify = JointTerm::ALL.map(|t| terms.contains(&t));
+        }
+        self.parameters.set_terms(&self.robot);
+        self
     }
 
     /// The same mechanism with a workspace box around home: half widths of the task coordinates.

@@ -166,27 +166,35 @@ impl Parameters {
             list.sort_by_key(|p| p.raw[0]);
             plain = list.iter().enumerate().all(|(i, p)| p.raw == [i]);
         }
-        let mut terms = Vec::new();
-        for (j, joint) in robot.joints.iter().enumerate() {
-            for (term, wanted) in JointTerm::ALL.into_iter().zip(joint.identify) {
-                if wanted {
-                    list.push(Parameter {
-                        name: format!("{}.{}", joint.name, term.name()),
-                        unit: term.unit(joint.motion),
-                        value: joint.terms[term as usize],
-                        raw: vec![10 * bodies.len() + terms.len()],
-                    });
-                    terms.push((j, term));
-                }
-            }
-        }
-        let parameters = Parameters {
+        let mut parameters = Parameters {
             bodies,
-            terms,
+            terms: Vec::new(),
             list,
             plain,
         };
+        parameters.set_terms(robot);
         (parameters, warnings)
+    }
+
+    /// Makes the joint terms that the robot asks for the unknowns after those of the bodies.
+    pub fn set_terms(&mut self, robot: &Robot) {
+        let bodies = 10 * self.bodies.len();
+        self.list
+            .retain(|p| p.raw.first().is_none_or(|&r| r < bodies));
+        self.terms.clear();
+        for (j, joint) in robot.joints.iter().enumerate() {
+            for (term, wanted) in JointTerm::ALL.into_iter().zip(joint.identify) {
+                if wanted {
+                    self.list.push(Parameter {
+                        name: format!("{}.{}", joint.name, term.name()),
+                        unit: term.unit(joint.motion),
+                        value: joint.terms[term as usize],
+                        raw: vec![bodies + self.terms.len()],
+                    });
+                    self.terms.push((j, term));
+                }
+            }
+        }
     }
 
     /// Number of raw columns.

@@ -2,7 +2,7 @@
 //! that move along its task coordinates.
 
 use super::task::Task;
-use crate::robot::{Body, Inertia, Joint, Limits, Motion, Prior, Robot};
+use crate::robot::{Body, Inertia, Joint, Motion, Prior, Robot};
 use nalgebra::{Matrix3, Vector3};
 
 /// Where a body hangs at zero joint position.
@@ -42,17 +42,7 @@ pub struct Builder {
 impl Builder {
     /// Adds a coordinate without limits; returns its index.
     pub fn coordinate(&mut self, name: &str, motion: Motion) -> usize {
-        self.joints.push(Joint {
-            name: name.into(),
-            motion,
-            continuous: false,
-            limits: Limits::default(),
-            torque_noise: None,
-            position_resolution: None,
-            gear_ratio: None,
-            terms: [0.0; 4],
-            identify: [false; 4],
-        });
+        self.joints.push(Joint::new(name, motion));
         self.joints.len() - 1
     }
 

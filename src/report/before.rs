@@ -5,6 +5,7 @@
 mod json;
 mod motion;
 mod parameters;
+mod platform;
 mod reproduce;
 mod spectrum;
 mod verdict;
@@ -45,11 +46,18 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
             "the robot alone, without a trajectory".to_string(),
         ),
     };
-    let line = format!("{}, {what}", count(robot.dof(), "joint"));
+    let joint = match assessment.mechanism {
+        true => "actuator",
+        false => "joint",
+    };
+    let line = format!("{}, {what}", count(robot.dof(), joint));
     let mut sections = Vec::new();
     sections.extend(warnings(assessment));
     sections.push(Section::new("", tiles(assessment)));
     if let Some(e) = &assessment.excitation {
+        if let Some(p) = &e.platform {
+            sections.extend(platform::sections(e, p));
+        }
         sections.push(motion::curves(robot, e));
         sections.push(motion::usage(robot, e));
     }
@@ -136,11 +144,19 @@ fn tiles(a: &Assessment) -> Markup {
     let (known, judged) = parameters::known(&e.predictions);
     tiles.extend([
         worst,
-        (
-            significant(e.condition.invariant, 3),
-            "condition number".to_string(),
-            "independent of the choice of base parameters".to_string(),
-        ),
+        match e.platform {
+            // parameters of a parallel robot differ by orders of magnitude in size
+            Some(_) => (
+                significant(e.condition.normalised, 3),
+                "condition number".to_string(),
+                "columns scaled to unit length".to_string(),
+            ),
+            None => (
+                significant(e.condition.invariant, 3),
+                "condition number".to_string(),
+                "independent of the choice of base parameters".to_string(),
+            ),
+        },
         (
             format!("{known} of {judged}"),
             format!("known to {KNOWN}\u{a0}% or better"),

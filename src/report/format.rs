@@ -86,6 +86,7 @@ pub fn unit_of(kind: Kind, motion: Motion) -> &'static str {
         (Kind::Acceleration, Motion::Prismatic) => "m/s²",
         (Kind::Jerk, Motion::Prismatic) => "m/s³",
         (Kind::Torque, Motion::Prismatic) => "N",
+        (Kind::Pose, _) => "",
     }
 }
 

@@ -13,9 +13,11 @@ mod axis;
 mod bars;
 mod canvas;
 mod panel;
+mod wireframe;
 
 pub use axis::{Axis, Spread};
 pub use bars::{Bar, bars};
+pub use wireframe::{Drawing, Line, wireframes};
 
 /// A colour: red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,12 +1,13 @@
 //! Robot files: a bundled name, a `.urdf`, or a `robot.toml` that adds what a URDF cannot say.
 
-mod joint;
-mod names;
+pub(crate) mod joint;
+pub(crate) mod names;
 mod template;
 
 use super::urdf::{Options, Urdf};
 use super::{Prior, Robot, bundled};
 use crate::error::{Error, Result, Warning};
+use crate::mechanism;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -39,20 +40,20 @@ struct RobotFile {
 
 /// A file name and its text, for messages and the hash.
 #[derive(Clone, Copy)]
-struct Text<'a> {
-    file: &'a Path,
-    text: &'a str,
+pub(crate) struct Text<'a> {
+    pub(crate) file: &'a Path,
+    pub(crate) text: &'a str,
 }
 
 impl Text<'_> {
     /// An error at a byte of the text, about `what` (may be empty).
-    fn error(&self, at: usize, what: &str, message: impl Into<String>) -> Error {
+    pub(crate) fn error(&self, at: usize, what: &str, message: impl Into<String>) -> Error {
         let line = 1 + self.text.bytes().take(at).filter(|b| *b == b'\n').count();
         let colon = if what.is_empty() { "" } else { ": " };
         Error::file(self.file, format!("line {line}{colon}{what}"), message)
     }
 
-    fn toml_error(&self, error: &toml::de::Error) -> Error {
+    pub(crate) fn toml_error(&self, error: &toml::de::Error) -> Error {
         let message = error.message().trim().replace('\n', "; ");
         match error.span() {
             Some(span) => self.error(span.start, "", message),
@@ -82,6 +83,12 @@ impl Robot {
         }
         if let Some(robot) = bundled::find(spec) {
             return robot.load();
+        }
+        if mechanism::bundled::find(spec).is_some() {
+            return Err(Error::Infeasible(format!(
+                "`{spec}` is a parallel robot, and what was asked for works with serial and tree \
+                 robots only"
+            )));
         }
         if directory {
             return Err(Error::file(
@@ -153,7 +160,7 @@ impl Robot {
 }
 
 /// The file at this path, as text.
-fn read_text(path: &Path) -> Result<String> {
+pub(crate) fn read_text(path: &Path) -> Result<String> {
     let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
     let mut bytes = Vec::new();
     file.take(MAX_BYTES + 1)
@@ -266,26 +273,29 @@ fn from_urdf(source: Text) -> Result<Robot> {
     Ok(robot)
 }
 
-fn file_stem(file: &Path) -> String {
+pub(crate) fn file_stem(file: &Path) -> String {
     file.file_stem()
         .map_or_else(|| "robot".to_string(), |s| s.to_string_lossy().into_owned())
 }
 
 fn parse(source: Text) -> Result<RobotFile> {
     let table: toml::Table = toml::from_str(source.text).map_err(|e| source.toml_error(&e))?;
-    mechanism(source, &table)?;
+    refuse_mechanism(source, &table)?;
     toml::from_str(source.text).map_err(|e| source.toml_error(&e))
 }
 
-/// Where a parallel mechanism would be built instead of a tree.
-fn mechanism(source: Text, table: &toml::Table) -> Result<()> {
-    if !table.contains_key("mechanism") {
+/// A parallel robot is no tree.
+fn refuse_mechanism(source: Text, table: &toml::Table) -> Result<()> {
+    let Some(kind) = table.get("mechanism") else {
         return Ok(());
-    }
+    };
     Err(Error::file(
         source.file,
         "mechanism",
-        "parallel mechanisms: not supported by this version",
+        format!(
+            "this is a parallel robot (mechanism = {kind}), and what was asked for works with \
+             serial and tree robots only"
+        ),
     ))
 }
 
@@ -322,8 +332,13 @@ fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
         options.lock.insert(name.clone(), *value.get_ref());
     }
     let mut entries: HashMap<&str, &JointEntry> = HashMap::new();
-    for entry in file.joint.iter().map(Spanned::get_ref) {
+    for whole in &file.joint {
+        let entry = whole.get_ref();
         let (name, at) = (entry.name.get_ref().as_str(), entry.name.span().start);
+        if name.is_empty() {
+            let at = whole.span().start;
+            return Err(source.error(at, "[[joint]]", "it has no name; add name = \"…\""));
+        }
         if !names.contains(&name) {
             return Err(unknown(name, at, "[[joint]]"));
         }

@@ -158,6 +158,23 @@ pub struct Joint {
     pub identify: [bool; 4],
 }
 
+impl Joint {
+    /// A joint without limits and without terms.
+    pub fn new(name: &str, motion: Motion) -> Self {
+        Joint {
+            name: name.into(),
+            motion,
+            continuous: false,
+            limits: Limits::default(),
+            torque_noise: None,
+            position_resolution: None,
+            gear_ratio: None,
+            terms: [0.0; 4],
+            identify: [false; 4],
+        }
+    }
+}
+
 /// How far the nominal values can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]

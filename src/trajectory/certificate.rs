@@ -9,7 +9,7 @@ use crate::robot::Robot;
 /// A limit counts as kept when it is exceeded by no more than this part of its range.
 pub const TOLERANCE: f64 = 1e-9;
 
-/// The five kinds of limits.
+/// Kinds of limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -23,6 +23,8 @@ pub enum Kind {
     Jerk,
     /// torque or force
     Torque,
+    /// of the pose of a parallel robot: passive joint, singularity, distance
+    Pose,
 }
 
 impl Kind {
@@ -34,6 +36,7 @@ impl Kind {
             Kind::Acceleration => "acceleration",
             Kind::Jerk => "jerk",
             Kind::Torque => "torque",
+            Kind::Pose => "margin",
         }
     }
 }
@@ -56,7 +59,8 @@ pub struct Peak {
 }
 
 impl Peak {
-    fn new(peak: Extremum, bound: f64, limit: f64) -> Self {
+    /// The largest magnitude `peak.value`, which lies below `bound` at all times, against a limit.
+    pub fn new(peak: Extremum, bound: f64, limit: f64) -> Self {
         let limit = limit.is_finite().then_some(limit);
         let used = limit.map(|l| {
             if peak.value == 0.0 {
@@ -105,6 +109,33 @@ pub struct Range {
 }
 
 impl Range {
+    /// The range from `min` to `max`, which lies in `bounds` at all times, against limits (infinite
+    /// where there are none).
+    pub fn new(min: Extremum, max: Extremum, bounds: [f64; 2], limits: [f64; 2]) -> Self {
+        let [lower, upper] = limits.map(|v| v.is_finite().then_some(v));
+        let used = lower.zip(upper).map(|(a, b)| {
+            let far = (max.value - 0.5 * (a + b)).max(0.5 * (a + b) - min.value);
+            if far == 0.0 {
+                0.0
+            } else {
+                far / (0.5 * (b - a))
+            }
+        });
+        let margin = match (lower.map(|a| min.value - a), upper.map(|b| b - max.value)) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+        Range {
+            min,
+            max,
+            bounds,
+            lower,
+            upper,
+            used,
+            margin,
+        }
+    }
+
     /// Whether the enclosure stays within the limits.
     pub fn satisfied(&self) -> bool {
         let range = match (self.lower, self.upper) {
@@ -189,7 +220,8 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    fn new(joints: Vec<JointCertificate>) -> Self {
+    /// Of all joints.
+    pub fn new(joints: Vec<JointCertificate>) -> Self {
         let mut worst: Option<Worst> = None;
         let mut satisfied = true;
         for joint in &joints {
@@ -247,31 +279,8 @@ pub fn certify(robot: &Robot, trajectory: &Fourier) -> Result<Certificate> {
         .enumerate()
         .map(|(j, joint)| {
             let q = range(j, 0);
-            let [lower, upper] = joint.limits.position.map(|v| v.is_finite().then_some(v));
-            let used = lower.zip(upper).map(|(a, b)| {
-                let far = (q.max.value - 0.5 * (a + b)).max(0.5 * (a + b) - q.min.value);
-                if far == 0.0 {
-                    0.0
-                } else {
-                    far / (0.5 * (b - a))
-                }
-            });
-            let margin = match (
-                lower.map(|a| q.min.value - a),
-                upper.map(|b| b - q.max.value),
-            ) {
-                (Some(a), Some(b)) => Some(a.min(b)),
-                (a, b) => a.or(b),
-            };
-            let position = Range {
-                min: q.min,
-                max: q.max,
-                bounds: [q.lower_bound, q.upper_bound],
-                lower,
-                upper,
-                used,
-                margin,
-            };
+            let bounds = [q.lower_bound, q.upper_bound];
+            let position = Range::new(q.min, q.max, bounds, joint.limits.position);
             let peak = |order: u32, limit: f64| {
                 let e = range(j, order);
                 Peak::new(e.largest(), e.magnitude_bound(), limit)

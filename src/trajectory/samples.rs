@@ -170,7 +170,7 @@ pub fn write_samples(
 
 /// A line being put together, its memory kept.
 #[derive(Default)]
-struct Line(String);
+pub(crate) struct Line(String);
 
 impl Line {
     fn header(&mut self, w: &mut dyn Write, dof: usize, torque: bool) -> io::Result<()> {
@@ -183,7 +183,7 @@ impl Line {
         writeln!(w, "{text}")
     }
 
-    fn row(
+    pub(crate) fn row(
         &mut self,
         w: &mut dyn Write,
         t: f64,
@@ -236,12 +236,27 @@ pub fn read_samples(path: impl AsRef<Path>, dof: usize) -> Result<Samples> {
     })
 }
 
-/// Reads the named columns of a CSV file with a header, in the order of `names`.
+/// Names of the columns of a CSV file with a header.
 ///
 /// # Errors
-/// As [`read_samples`].
-pub fn read_columns(path: impl AsRef<Path>, names: &[String]) -> Result<Vec<Vec<f64>>> {
-    let path = path.as_ref();
+/// A file that cannot be read or is empty.
+pub fn column_names(path: impl AsRef<Path>) -> Result<Vec<String>> {
+    Ok(open(path.as_ref())?.1)
+}
+
+/// What is wrong with a file that is no CSV.
+fn broken(path: &Path, e: csv::Error) -> Error {
+    let place = e
+        .position()
+        .map_or(String::new(), |p| format!("line {}", p.line()));
+    match e.into_kind() {
+        csv::ErrorKind::Io(source) => Error::io(path, source),
+        other => Error::file(path, place, format!("{other:?}")),
+    }
+}
+
+/// A CSV file behind its header.
+fn open(path: &Path) -> Result<(csv::Reader<std::fs::File>, Vec<String>)> {
     let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -249,24 +264,16 @@ pub fn read_columns(path: impl AsRef<Path>, names: &[String]) -> Result<Vec<Vec<
         .trim(csv::Trim::All)
         .buffer_capacity(1 << 18)
         .from_reader(file);
-    let broken = |e: csv::Error| {
-        let place = e
-            .position()
-            .map_or(String::new(), |p| format!("line {}", p.line()));
-        match e.into_kind() {
-            csv::ErrorKind::Io(source) => Error::io(path, source),
-            other => Error::file(path, place, format!("{other:?}")),
-        }
-    };
     let mut record = csv::ByteRecord::new();
-    if !reader.read_byte_record(&mut record).map_err(broken)? {
+    let any = reader.read_byte_record(&mut record);
+    if !any.map_err(|e| broken(path, e))? {
         return Err(Error::file(
             path,
             "",
             "is empty; a header with column names is needed",
         ));
     }
-    let header: Vec<String> = record
+    let header = record
         .iter()
         .map(|name| {
             String::from_utf8_lossy(name)
@@ -275,6 +282,18 @@ pub fn read_columns(path: impl AsRef<Path>, names: &[String]) -> Result<Vec<Vec<
                 .to_string()
         })
         .collect();
+    Ok((reader, header))
+}
+
+/// Reads the named columns of a CSV file with a header, in the order of `names`.
+///
+/// # Errors
+/// As [`read_samples`].
+pub fn read_columns(path: impl AsRef<Path>, names: &[String]) -> Result<Vec<Vec<f64>>> {
+    let path = path.as_ref();
+    let broken = |e| broken(path, e);
+    let (mut reader, header) = open(path)?;
+    let mut record = csv::ByteRecord::new();
     let mut places = Vec::with_capacity(names.len());
     for name in names {
         let mut found = (0..header.len()).filter(|&k| header[k] == *name);

@@ -3,7 +3,7 @@
 use super::reproduce::seed;
 use super::verdict::{verdict, violations};
 use crate::design::record::Record;
-use crate::identifiability::{Assessment, Excitation};
+use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::trajectory::certificate::{JointCertificate, Peak};
 use serde_json::{Map, Value, json};
 
@@ -76,6 +76,11 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
     put("standard_parameters", json!(a.base.standard));
     put("warnings", json!(a.warnings));
     put("trajectory", e.map_or(Value::Null, trajectory));
+    put(
+        "platform",
+        e.and_then(|e| e.platform.as_ref())
+            .map_or(Value::Null, platform),
+    );
     put("version", json!(env!("CARGO_PKG_VERSION")));
     put("robot_hash", json!(a.robot.hash));
     put(
@@ -110,7 +115,7 @@ fn relative_std(a: &Assessment) -> Value {
             })
             .collect(),
         None => {
-            let nominal = a.base.project(&a.robot.parameters());
+            let nominal = a.base.project(&a.values);
             (0..a.base.count())
                 .map(|k| {
                     json!({
@@ -183,6 +188,23 @@ fn peak(p: &Peak) -> Value {
         "used": optional(p.used),
         "margin": optional(p.margin),
         "satisfied": p.satisfied(),
+    })
+}
+
+/// What the platform of a parallel robot does.
+fn platform(p: &Platform) -> Value {
+    let c = &p.certificate;
+    let least = |which: usize| {
+        let all = p.sigma.iter().filter_map(|s| s[which]);
+        all.fold(None, |m: Option<f64>, s| Some(m.map_or(s, |m| m.min(s))))
+    };
+    json!({
+        "coordinates": p.names,
+        "box": c.platform.joints.iter().map(joint).collect::<Vec<_>>(),
+        "pose": c.pose,
+        "singularity": { "actuation": optional(least(0)), "constraint": optional(least(1)) },
+        "proven": c.proven,
+        "satisfied": c.satisfied,
     })
 }
 

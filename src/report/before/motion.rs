@@ -4,7 +4,7 @@ use super::super::format::{percent, significant, unit_of};
 use super::super::html::{self, Section};
 use super::super::plot::{self, Axis, Bar, Colour, Marker, Panel, Series, Shape};
 use super::verdict::violations;
-use crate::identifiability::{Excitation, RATE};
+use crate::identifiability::{Excitation, Platform, RATE};
 use crate::robot::{Motion, Robot};
 use crate::trajectory::certificate::{Kind, Peak};
 use maud::{Markup, html};
@@ -23,6 +23,7 @@ fn heading(kind: Kind, robot: &Robot) -> &'static str {
         Kind::Torque if robot.joints.iter().all(|j| slides(j.motion)) => "Force",
         Kind::Torque if robot.joints.iter().any(|j| slides(j.motion)) => "Torque or force",
         Kind::Torque => "Torque",
+        Kind::Pose => "Margin",
     }
 }
 
@@ -62,7 +63,7 @@ pub(super) fn curves(robot: &Robot, e: &Excitation) -> Section {
             ]))
             "The percentage is the part of the limit that is used."
         }))
-        p {
+        @if let Some(p) = &e.platform { p { (closed(p)) } } @else { p {
             "Extrema of position, velocity, acceleration and jerk are those of the Fourier series \
              itself, found as roots of its derivative, not the largest of some samples. Torque is \
              that of the nominal model at " (significant(RATE, 4)) " Hz in the figure; its largest \
@@ -70,10 +71,34 @@ pub(super) fn curves(robot: &Robot, e: &Excitation) -> Section {
              between the samples. Coulomb friction counts with the sign that makes the torque \
              larger at all times. \
              Collisions with the robot itself or its surroundings are not part of this proof."
-        }
+        } }
         (html::details("Certified extrema in numbers", numbers(robot, e)))
     };
-    Section::new("Motion and limits", body)
+    let title = match e.platform {
+        Some(_) => "Actuators and limits",
+        None => "Motion and limits",
+    };
+    Section::new(title, body)
+}
+
+/// What is proven of a closed chain, and what is stated.
+fn closed(p: &Platform) -> &'static str {
+    match p.certificate.proven {
+        true => {
+            "These are the actuators. Their positions, velocities, accelerations and jerks hold at \
+             all times: they are enclosed over every stretch of time by interval arithmetic on the \
+             kinematics. Forces are those of the nominal model at 4000 instants; between two of \
+             them they are bounded by twice the largest second difference, which is stated, not \
+             proven. Coulomb friction counts with the sign that makes the force larger. Collisions \
+             other than of legs are not looked at."
+        }
+        false => {
+            "These are the actuators, at 4000 instants. Between two of them everything is bounded \
+             by twice the largest second difference: this mechanism has no closed-form kinematics, \
+             so that bound is stated, not proven. Coulomb friction counts with the sign that makes \
+             the force larger. Collisions other than of legs are not looked at."
+        }
+    }
 }
 
 /// One quantity of one joint.

@@ -5,7 +5,7 @@ use super::super::html::{self, Section};
 use super::KNOWN;
 use crate::base::{Identifiability, StandardParameter};
 use crate::identifiability::{Assessment, Excitation, Prediction, RATE};
-use crate::robot::{Column, JointTerm, Motion, inertia};
+use crate::robot::{JointTerm, Motion, inertia};
 use maud::{Markup, html};
 
 /// How many will be known to [`KNOWN`] percent or better, of how many whose nominal value is not 0.
@@ -101,7 +101,7 @@ fn noise(a: &Assessment) -> String {
 }
 
 fn plain(a: &Assessment) -> Markup {
-    let nominal = a.base.project(&a.robot.parameters());
+    let nominal = a.base.project(&a.values);
     let rows: Vec<Vec<Markup>> = nominal
         .iter()
         .enumerate()
@@ -122,53 +122,42 @@ fn plain(a: &Assessment) -> Markup {
     }
 }
 
+/// Owner and parameter of a name: `link3` and `mz` of `link3.mz`.
+fn split(name: &str) -> (&str, &str) {
+    name.rsplit_once('.').unwrap_or(("", name))
+}
+
 /// Which standard parameters are identifiable, link by link and joint by joint, and why not.
 pub(super) fn classes(a: &Assessment) -> Section {
-    let columns = a.robot.columns();
-    let standard: Vec<(Column, &StandardParameter)> =
-        columns.iter().copied().zip(&a.base.standard).collect();
-    let links: Vec<Vec<Markup>> = a
-        .robot
-        .bodies
-        .iter()
-        .enumerate()
-        .map(|(b, body)| {
-            let mut row = vec![html! { (body.name) }];
-            row.extend((0..inertia::PARAMETERS).map(|k| {
-                let wanted = Column::Inertial { body: b, k };
-                chip(standard.iter().find(|(c, _)| *c == wanted).map(|(_, s)| *s))
+    let standard = &a.base.standard;
+    // owners of parameters of a kind, in order, with a cell for each of the names
+    let sheet = |names: &[&str]| -> Vec<Vec<Markup>> {
+        let of_kind = |s: &&StandardParameter| names.contains(&split(&s.name).1);
+        let mut owners: Vec<&str> = Vec::new();
+        for s in standard.iter().filter(of_kind) {
+            let owner = split(&s.name).0;
+            if !owners.contains(&owner) {
+                owners.push(owner);
+            }
+        }
+        let row = |owner: &&str| {
+            let mut row = vec![html! { (owner) }];
+            row.extend(names.iter().map(|name| {
+                let wanted = (*owner, *name);
+                chip(standard.iter().find(|s| split(&s.name) == wanted))
             }));
             row
-        })
-        .collect();
-    let terms: Vec<JointTerm> = JointTerm::ALL
-        .into_iter()
-        .filter(|t| {
-            let has = |c: &Column| matches!(c, Column::Term { term, .. } if term == t);
-            columns.iter().any(has)
-        })
-        .collect();
-    let joints: Vec<Vec<Markup>> = a
-        .robot
-        .joints
-        .iter()
-        .enumerate()
-        .filter(|(_, j)| j.identify.contains(&true))
-        .map(|(j, joint)| {
-            let mut row = vec![html! { (joint.name) }];
-            row.extend(terms.iter().map(|&term| {
-                let wanted = Column::Term { joint: j, term };
-                chip(standard.iter().find(|(c, _)| *c == wanted).map(|(_, s)| *s))
-            }));
-            row
-        })
-        .collect();
-    let total = |c| {
-        standard
-            .iter()
-            .filter(|(_, s)| s.identifiability == c)
-            .count()
+        };
+        owners.iter().map(row).collect()
     };
+    let links = sheet(&inertia::NAMES);
+    let terms: Vec<&str> = JointTerm::ALL
+        .into_iter()
+        .map(JointTerm::name)
+        .filter(|t| standard.iter().any(|s| split(&s.name).1 == *t))
+        .collect();
+    let joints = sheet(&terms);
+    let total = |c| standard.iter().filter(|s| s.identifiability == c).count();
     let body = html! {
         p class="key" {
             span { i class="chip alone" {} "identifiable alone ("
@@ -180,9 +169,9 @@ pub(super) fn classes(a: &Assessment) -> Section {
         (matrix("link", &inertia::NAMES, &links))
         @if !joints.is_empty() {
             h3 { "Joint terms" }
-            (matrix("joint", &terms.iter().map(|t| t.name()).collect::<Vec<_>>(), &joints))
+            (matrix("joint", &terms, &joints))
         }
-        (html::details("Reasons, parameter by parameter", reasons(a, &standard)))
+        (html::details("Reasons, parameter by parameter", reasons(standard)))
     };
     Section::new("Which standard parameters are identifiable", body)
 }
@@ -216,36 +205,25 @@ fn chip(parameter: Option<&StandardParameter>) -> Markup {
 }
 
 /// Reasons, equal neighbours of a link together.
-fn reasons(a: &Assessment, standard: &[(Column, &StandardParameter)]) -> Markup {
-    let owner = |c: &Column| match *c {
-        Column::Inertial { body, .. } => (0, body),
-        Column::Term { joint, .. } => (1, joint),
-    };
+fn reasons(standard: &[StandardParameter]) -> Markup {
     let said = |p: &StandardParameter| match (p.identifiability, p.reason.as_str()) {
         (Identifiability::Alone, "") => "has a value of its own in the torques".to_string(),
         (Identifiability::Combination, "") => "felt only together with others".to_string(),
         (Identifiability::None, "") => "never acts on any joint".to_string(),
         (_, reason) => reason.to_string(),
     };
-    let short = |p: &StandardParameter| {
-        let name = p.name.rsplit_once('.').map_or(p.name.as_str(), |(_, n)| n);
-        name.to_string()
-    };
     let mut rows: Vec<Vec<Markup>> = Vec::new();
-    for group in standard.chunk_by(|x, y| owner(&x.0) == owner(&y.0)) {
+    for group in standard.chunk_by(|x, y| split(&x.name).0 == split(&y.name).0) {
         // in the order in which a reason first appears
         let mut texts: Vec<(String, Vec<String>)> = Vec::new();
-        for (_, p) in group {
+        for p in group {
             let text = said(p);
             match texts.iter_mut().find(|(t, _)| *t == text) {
-                Some((_, names)) => names.push(short(p)),
-                None => texts.push((text, vec![short(p)])),
+                Some((_, names)) => names.push(split(&p.name).1.to_string()),
+                None => texts.push((text, vec![split(&p.name).1.to_string()])),
             }
         }
-        let name = group.first().map_or("", |(c, _)| match *c {
-            Column::Inertial { body, .. } => &a.robot.bodies[body].name,
-            Column::Term { joint, .. } => &a.robot.joints[joint].name,
-        });
+        let name = group.first().map_or("", |p| split(&p.name).0);
         for (k, (text, names)) in texts.into_iter().enumerate() {
             rows.push(vec![
                 html! { @if k == 0 { strong { (name) } } },

@@ -2,7 +2,8 @@
 
 use super::super::format::{count, percent, significant, unit_of, with_unit};
 use super::{KNOWN, parameters};
-use crate::identifiability::{Assessment, Excitation};
+use crate::identifiability::{Assessment, Excitation, Platform};
+use crate::mechanism::PoseKind;
 use crate::robot::{Motion, Robot};
 use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
 
@@ -79,7 +80,10 @@ pub fn verdict(a: &Assessment) -> Verdict {
         .iter()
         .filter(|p| p.std.is_nan() || p.std >= 1e299)
         .count();
-    let condition = e.condition.invariant;
+    let condition = match e.platform {
+        Some(_) => e.condition.normalised,
+        None => e.condition.invariant,
+    };
     if condition.is_nan() || condition > UNEXCITED || lost > 0 {
         return Verdict {
             grade: Grade::Unexciting,
@@ -87,7 +91,7 @@ pub fn verdict(a: &Assessment) -> Verdict {
                 "Safe to run, but not every parameter is excited: {limits}, yet the motion does \
                  not tell all {} apart (condition number {}).",
                 count(b, "base parameter"),
-                significant(e.condition.invariant, 2)
+                significant(condition, 2)
             ),
         };
     }
@@ -105,7 +109,7 @@ pub fn verdict(a: &Assessment) -> Verdict {
         "{limits}, {}, condition number {}; {of} will be known to {KNOWN}\u{a0}% or better at the \
          {noise} torque noise",
         count(b, "base parameter"),
-        significant(e.condition.invariant, 3),
+        significant(condition, 3),
     );
     if 2 * known >= judged {
         Verdict {
@@ -146,8 +150,48 @@ pub(super) fn violations(robot: &Robot, e: &Excitation) -> Vec<String> {
             all.push(magnitude(&c.joint, Kind::Torque, joint.motion, &peak));
         }
     }
+    if let Some(p) = &e.platform {
+        of_platform(p, &mut all);
+    }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.into_iter().map(|(_, text)| text).collect()
+}
+
+/// Limits of the platform, the passive joints and the singularities that do not hold.
+fn of_platform(p: &Platform, all: &mut Vec<(f64, String)>) {
+    for (k, c) in p.certificate.platform.joints.iter().enumerate() {
+        let motion = match p.task.is_angle(k) {
+            true => Motion::Revolute,
+            false => Motion::Prismatic,
+        };
+        position(motion, c, all);
+        for (kind, peak) in [
+            (Kind::Velocity, c.velocity),
+            (Kind::Acceleration, c.acceleration),
+            (Kind::Jerk, c.jerk),
+        ] {
+            if !peak.satisfied() {
+                all.push(magnitude(&c.joint, kind, motion, &peak));
+            }
+        }
+    }
+    for q in p.certificate.pose.iter().filter(|q| !q.satisfied) {
+        let (what, unit, side) = match q.kind {
+            PoseKind::PassiveJoint => ("opens to", "rad", "at most"),
+            PoseKind::Distance => ("come as near as", "m", "at least"),
+            _ => ("has a smallest singular value of", "", "at least"),
+        };
+        all.push((
+            q.used,
+            format!(
+                "{} {what} {} at t = {}, where {side} {} is allowed",
+                q.name,
+                with_unit(q.value, 4, unit),
+                with_unit(q.time, 4, "s"),
+                with_unit(q.limit, 4, unit)
+            ),
+        ));
+    }
 }
 
 /// A magnitude beyond its limit, and which part of the limit it takes.

@@ -10,8 +10,10 @@ use toml::Spanned;
 /// One `[[joint]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct JointEntry {
-    pub(super) name: Spanned<String>,
+pub(crate) struct JointEntry {
+    /// empty where it is missing, so that the same entry can state what all joints share
+    #[serde(default = "nameless")]
+    pub(crate) name: Spanned<String>,
     position: Option<Spanned<Vec<f64>>>,
     velocity: Option<Spanned<f64>>,
     acceleration: Option<Spanned<f64>>,
@@ -28,8 +30,12 @@ pub(super) struct JointEntry {
     identify: Vec<Spanned<String>>,
 }
 
+fn nameless() -> Spanned<String> {
+    Spanned::new(0..0, String::new())
+}
+
 /// The limits that replace those of the URDF, checked.
-pub(super) fn stated_limits(source: Text, entry: &JointEntry, what: &str) -> Result<StatedLimits> {
+pub(crate) fn stated_limits(source: Text, entry: &JointEntry, what: &str) -> Result<StatedLimits> {
     let position = match &entry.position {
         None => None,
         Some(position) => match position.get_ref()[..] {
@@ -88,7 +94,7 @@ fn positive_finite(
 }
 
 /// Everything of a `[[joint]]` that the tree does not need.
-pub(super) fn joint_values(
+pub(crate) fn joint_values(
     source: Text,
     entry: &JointEntry,
     what: &str,

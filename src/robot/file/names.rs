@@ -1,7 +1,7 @@
 //! Names in messages: lists, and the one that was probably meant.
 
 /// Names for a message, at most twenty.
-pub(super) fn listed(names: &[&str]) -> String {
+pub(crate) fn listed(names: &[&str]) -> String {
     let more = if names.len() > 20 { ", …" } else { "" };
     format!(
         "{}{more}",
@@ -15,7 +15,7 @@ pub(super) fn listed(names: &[&str]) -> String {
 }
 
 /// ` (did you mean …?)` where a name is close.
-pub(super) fn did_you_mean<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+pub(crate) fn did_you_mean<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     match closest(name, names) {
         Some(close) => format!(" (did you mean `{close}`?)"),
         None => String::new(),
