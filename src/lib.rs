@@ -37,6 +37,7 @@
 //! | base | [`base`] | base parameters, rank, what cannot be identified and why |
 //! | trajectory | [`trajectory`] | Fourier series, exact extrema, certificates, files |
 //! | design | [`design`] | the optimiser |
+//! | log | [`log`], [`signals`] | what was recorded, repaired, filtered, differentiated |
 //! | report | [`identifiability`], [`report`] | what the run will tell, as JSON and HTML |
 //!
 //! | symbol | meaning |
@@ -57,12 +58,14 @@ pub mod design;
 pub mod dynamics;
 pub mod error;
 pub mod identifiability;
+pub mod log;
 pub mod mechanism;
 pub mod output;
 pub mod plant;
 pub mod regressor;
 pub mod report;
 pub mod robot;
+pub mod signals;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning};

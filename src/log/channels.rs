@@ -1,0 +1,154 @@
+//! Channels that cannot be what was measured: saturated, stuck, dropped, in other units.
+
+use super::clock::median;
+use crate::error::Warning;
+use crate::robot::{Joint, Motion};
+use std::f64::consts::PI;
+
+/// Runs of equal neighbours: first index and length.
+fn runs(y: &[f64]) -> impl Iterator<Item = (usize, usize)> + '_ {
+    let mut start = 0;
+    std::iter::from_fn(move || {
+        if start >= y.len() {
+            return None;
+        }
+        let length = y[start..].iter().take_while(|x| **x == y[start]).count();
+        let run = (start, length.max(1));
+        start += run.1;
+        Some(run)
+    })
+}
+
+/// Marks the samples of a torque channel that stand at its largest or smallest value for long, as
+/// clipping makes them, and returns their number and that value.
+///
+/// A channel that is merely coarse also dwells at its extremes, but no longer than elsewhere: what
+/// counts are runs of at least five samples, four times as long as usual in this channel, that
+/// make up at least 0.1 % of the record; or any such run at the effort limit.
+pub fn saturated(y: &[f64], effort: f64, valid: &mut [bool]) -> Option<(usize, f64)> {
+    let (low, high) = y
+        .iter()
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+            (a.min(x), b.max(x))
+        });
+    if !(high > low) {
+        return None;
+    }
+    let usual = median(runs(y).map(|r| r.1 as f64));
+    let mut worst = None;
+    for level in [high, low] {
+        let near = |x: f64| (x - level).abs() <= 1e-9 * (high - low);
+        // a run at the level, and not only of equal values, so that rounding does not hide it
+        let mut found = Vec::new();
+        let mut i = 0;
+        while i < y.len() {
+            let length = y[i..].iter().take_while(|x| near(**x)).count();
+            if length >= 5 && length as f64 >= 4.0 * usual {
+                found.push((i, length));
+            }
+            i += length.max(1);
+        }
+        let total: usize = found.iter().map(|r| r.1).sum();
+        let at_limit = level.abs() >= 0.98 * effort && total > 0;
+        // a channel that rests at its extreme throughout is constant, not clipped
+        if (total as f64 >= 1e-3 * y.len() as f64 && total * 2 < y.len()) || at_limit {
+            for (start, length) in found {
+                valid[start..start + length].fill(false);
+            }
+            if worst.is_none_or(|(n, _)| total > n) {
+                worst = Some((total, level));
+            }
+        }
+    }
+    worst
+}
+
+/// Runs of equal values longer than a tenth of a second while `moving` says that the joint moves
+/// (at at least half of the run). Marks them and returns their number, samples and first index.
+pub fn stuck(
+    y: &[f64],
+    step: f64,
+    moving: &[bool],
+    valid: &mut [bool],
+) -> Option<(usize, usize, usize)> {
+    let least = ((0.1 / step).ceil() as usize).max(20);
+    let mut found: Option<(usize, usize, usize)> = None;
+    for (start, length) in runs(y) {
+        let range = start..start + length;
+        let awake = moving[range.clone()].iter().filter(|m| **m).count();
+        if length >= least && 2 * awake >= length {
+            valid[range].fill(false);
+            let (n, samples, first) = found.unwrap_or((0, 0, start));
+            found = Some((n + 1, samples + length, first));
+        }
+    }
+    found
+}
+
+/// Whether a position channel moves, sample by sample, from how far it is from a quarter of a
+/// tenth of a second before and after.
+pub fn moving(y: &[f64], step: f64) -> Vec<bool> {
+    let k = ((0.025 / step) as usize).max(2);
+    let n = y.len();
+    let far = |i: usize| {
+        let (a, b) = (i.saturating_sub(k), (i + k).min(n - 1));
+        (y[b] - y[a]).abs()
+    };
+    let (low, high) = y
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+            (a.min(x), b.max(x))
+        });
+    let enough = 1e-4 * (high - low);
+    (0..n).map(|i| high > low && far(i) > enough).collect()
+}
+
+/// What the range of a joint's positions says about their unit, if anything.
+pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
+    let (low, high) = q
+        .iter()
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+            (a.min(x), b.max(x))
+        });
+    let limits = joint.limits.position;
+    let span = limits[1] - limits[0];
+    let fits = |scale: f64| {
+        let slack = 0.02 * span.min(1e3);
+        low * scale >= limits[0] - slack && high * scale <= limits[1] + slack
+    };
+    let bounded = span.is_finite();
+    if bounded && fits(1.0) || !bounded && (high - low) < 8.0 * PI {
+        return None;
+    }
+    let text = |why: &str| {
+        Some(Warning::new(
+            &joint.name,
+            format!("its positions go from {low:.3} to {high:.3}, {why}"),
+        ))
+    };
+    let revolute = joint.motion == Motion::Revolute;
+    if let Some(gear) = joint.gear_ratio.filter(|g| g.abs() > 1.5)
+        && bounded
+        && (fits(1.0 / gear) || fits(-1.0 / gear))
+    {
+        return text(
+            "which fits its limits only after division by the gear ratio: are they those of the motor?",
+        );
+    }
+    if revolute && high.abs().max(low.abs()) > 2.0 * PI && (fits(PI / 180.0) || !bounded) {
+        return text("which looks like degrees; radians are expected");
+    }
+    if !revolute && fits(1e-3) {
+        return text("which looks like millimetres; metres are expected");
+    }
+    bounded
+        .then(|| {
+            text(&format!(
+                "beyond its limits of {:.3} to {:.3}: another unit, another zero or another joint?",
+                limits[0], limits[1]
+            ))
+        })
+        .flatten()
+}

@@ -1,0 +1,406 @@
+//! A log of a robot: which column is what, repaired and put on an even time grid.
+
+use super::clock::{self, Clock};
+use super::resample::{Order, fill, interpolate};
+use super::{Payload, Purpose, Record, Table, channels};
+use crate::error::{Error, Result, Warning};
+use crate::plant::Plant;
+use crate::robot::Joint;
+use rayon::prelude::*;
+use std::path::Path;
+
+const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
+/// Groups of one column an actuator.
+const GROUPS: [&str; 8] = ["tau", "ddq", "dq", "qref", "ql", "q", "pa", "pb"];
+
+/// Group and number of a column name: `tau3` is `("tau", 3)`.
+fn numbered(name: &str) -> Option<(&'static str, usize)> {
+    let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let head = &name[..name.len() - digits.len()];
+    let group = GROUPS.into_iter().find(|g| *g == head)?;
+    (!digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
+        .then(|| digits.parse().ok().map(|k| (group, k)))
+        .flatten()
+}
+
+/// Takes the columns of a group out of the table, one an actuator.
+fn take(table: &mut Table, group: &str, n: usize, path: &Path) -> Result<Option<Vec<Vec<f64>>>> {
+    let at: Vec<Option<usize>> = (1..=n)
+        .map(|k| table.find(&format!("{group}{k}")))
+        .collect();
+    if at.iter().all(Option::is_none) {
+        return Ok(None);
+    }
+    if let Some(k) = at.iter().position(Option::is_none) {
+        let message = format!(
+            "it has columns {group}… but not {group}{}: the robot has {n} actuated joints",
+            k + 1
+        );
+        return Err(Error::file(path, "line 1", message));
+    }
+    let columns = at.into_iter().flatten();
+    Ok(Some(
+        columns
+            .map(|c| std::mem::take(&mut table.columns[c]))
+            .collect(),
+    ))
+}
+
+/// Whether the names of the columns can be those of a log of `n` actuators.
+fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warning>> {
+    let n = joints.len();
+    let error = |message: String| Err(Error::file(path, "line 1", message));
+    let mut unknown = Vec::new();
+    for name in &table.names {
+        match numbered(name) {
+            Some((group, 0)) => {
+                return error(format!(
+                    "column {name}: joints are counted from 1, in the order of the robot file ({group}1 is {})",
+                    joints.first().map_or("the first", |j| &j.name)
+                ));
+            }
+            Some((_, k)) if k > n => {
+                let names: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
+                return error(format!(
+                    "column {name}: the robot has {n} actuated joints ({}); is this the log of another robot?",
+                    names.join(", ")
+                ));
+            }
+            Some(_) => {}
+            None if name == "t" || POSE.contains(&name.as_str()) => {}
+            None => unknown.push(name.as_str()),
+        }
+    }
+    if table.find("t").is_none() {
+        let message = match table.find("time") {
+            Some(_) => "there is no column t; it has one called time: rename it",
+            None => "there is no column t (time, s)",
+        };
+        return error(message.into());
+    }
+    if table.find("q1").is_none() {
+        return error("there are no columns q1… (positions of the actuated joints)".into());
+    }
+    if table.find("tau1").is_none() && table.find("pa1").is_none() {
+        return error(
+            "there are no columns tau1… (torques or forces of the actuated joints)".into(),
+        );
+    }
+    Ok(match unknown.is_empty() {
+        true => Vec::new(),
+        false => vec![Warning::new(
+            path.display().to_string(),
+            format!(
+                "columns that are not known were left alone: {}",
+                unknown.join(", ")
+            ),
+        )],
+    })
+}
+
+impl Record {
+    /// Reads a log of `plant`; see the [module](super) for what is done to it. `period` is that of
+    /// the motion, s.
+    ///
+    /// # Errors
+    /// A file that is no log of this robot, a channel without any value, a log that does not move;
+    /// with the file, and the line or channel.
+    pub fn read(
+        path: impl AsRef<Path>,
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+    ) -> Result<Record> {
+        let path = path.as_ref();
+        let known = |name: &str| name == "t" || POSE.contains(&name) || numbered(name).is_some();
+        let mut table = Table::read(path, &known)?;
+        let joints = plant.actuators();
+        let n = joints.len();
+        let mut warnings = std::mem::take(&mut table.warnings);
+        warnings.extend(check_names(&table, &joints, path)?);
+        let subject = path.display().to_string();
+
+        let at = table.find("t").unwrap_or(0);
+        let clock = clock::repair(&table.columns[at], &subject);
+        warnings.extend(clock.warnings.iter().cloned());
+        if clock.t.len() < 8 {
+            let message = format!("{} samples are too few", clock.t.len());
+            return Err(Error::file(path, "", message));
+        }
+        if let Some(keep) = &clock.keep {
+            for column in table.columns.iter_mut().filter(|c| !c.is_empty()) {
+                *column = keep.iter().map(|&i| column[i]).collect();
+            }
+        }
+        let mut record = Record {
+            name: path
+                .file_stem()
+                .map_or(String::new(), |s| s.to_string_lossy().into_owned()),
+            path: path.to_path_buf(),
+            purpose,
+            period,
+            payload: Payload::None,
+            step: clock.step,
+            t: Vec::new(),
+            valid: vec![true; clock.t.len()],
+            q: take(&mut table, "q", n, path)?.unwrap_or_default(),
+            tau: take(&mut table, "tau", n, path)?.unwrap_or_default(),
+            dq: take(&mut table, "dq", n, path)?,
+            ddq: take(&mut table, "ddq", n, path)?,
+            qref: take(&mut table, "qref", n, path)?,
+            ql: take(&mut table, "ql", n, path)?,
+            pose: None,
+            pressures: None,
+            resampled: false,
+            warnings,
+        };
+        if let (Some(a), Some(b)) = (
+            take(&mut table, "pa", n, path)?,
+            take(&mut table, "pb", n, path)?,
+        ) {
+            record.pressures = Some([a, b]);
+        }
+        let pose: Option<Vec<usize>> = POSE.iter().map(|c| table.find(c)).collect();
+        record.pose = pose.map(|at| {
+            at.into_iter()
+                .map(|c| std::mem::take(&mut table.columns[c]))
+                .collect()
+        });
+        drop(table);
+
+        record.fill_dropped(&clock)?;
+        record.check_channels(&joints)?;
+        record.resample(&clock);
+        record.check_period();
+        Ok(record)
+    }
+
+    /// Every channel with its name and how it is interpolated.
+    fn channels(&mut self) -> Vec<(String, Order, &mut Vec<f64>)> {
+        let mut out: Vec<(String, Order, &mut Vec<f64>)> = Vec::new();
+        let [mut pa, mut pb] = [None, None];
+        if let Some([a, b]) = &mut self.pressures {
+            (pa, pb) = (Some(a), Some(b));
+        }
+        for (group, order, columns) in [
+            ("q", Order::Cubic, Some(&mut self.q)),
+            ("tau", Order::Linear, Some(&mut self.tau)),
+            ("dq", Order::Cubic, self.dq.as_mut()),
+            ("ddq", Order::Linear, self.ddq.as_mut()),
+            ("qref", Order::Cubic, self.qref.as_mut()),
+            ("ql", Order::Cubic, self.ql.as_mut()),
+            ("pose ", Order::Cubic, self.pose.as_mut()),
+            ("pa", Order::Linear, pa),
+            ("pb", Order::Linear, pb),
+        ] {
+            for (k, column) in columns.into_iter().flatten().enumerate() {
+                out.push((format!("{group}{}", k + 1), order, column));
+            }
+        }
+        out
+    }
+
+    /// Interpolates dropped values, marks them, and names their channels.
+    fn fill_dropped(&mut self, clock: &Clock) -> Result<()> {
+        let path = self.path.clone();
+        let mut valid = std::mem::take(&mut self.valid);
+        let mut warnings = Vec::new();
+        for (name, order, column) in self.channels() {
+            let holes: Vec<usize> = (0..column.len())
+                .filter(|&i| !column[i].is_finite())
+                .collect();
+            let Some(&first) = holes.first() else {
+                continue;
+            };
+            if holes.len() == column.len() {
+                let message = "it holds no number at all: the channel was not recorded";
+                return Err(Error::file(&path, format!("column {name}"), message));
+            }
+            fill(&clock.t, column, order);
+            for &i in &holes {
+                valid[i] = false;
+            }
+            warnings.push(Warning::new(
+                format!("{}: {name}", path.display()),
+                format!(
+                    "{} of {} values were dropped, the first at {:.4} s; interpolated for the filters and \
+                     left out of the fit",
+                    holes.len(),
+                    column.len(),
+                    clock.t[first]
+                ),
+            ));
+        }
+        self.valid = valid;
+        self.warnings.extend(warnings);
+        Ok(())
+    }
+
+    /// Looks for saturated and stuck channels, joints that do not move, and other units.
+    fn check_channels(&mut self, joints: &[&Joint]) -> Result<()> {
+        let subject = self.path.display().to_string();
+        let step = self.step;
+        let moving: Vec<Vec<bool>> = self
+            .q
+            .par_iter()
+            .map(|q| channels::moving(q, step))
+            .collect();
+        let still: Vec<usize> = (0..joints.len())
+            .filter(|&j| !moving[j].contains(&true))
+            .collect();
+        if still.len() == joints.len() {
+            return Err(Error::file(
+                &self.path,
+                "",
+                "nothing moves in it: no position changes",
+            ));
+        }
+        for &j in &still {
+            self.warnings.push(Warning::new(
+                format!("{subject}: q{}", j + 1),
+                format!(
+                    "{} does not move; only what the others show of it can be identified",
+                    joints[j].name
+                ),
+            ));
+        }
+        let any: Vec<bool> = (0..self.valid.len())
+            .map(|i| moving.iter().any(|m| m[i]))
+            .collect();
+        for (j, joint) in joints.iter().enumerate() {
+            self.warnings
+                .extend(channels::position_unit(joint, &self.q[j]));
+            let name = format!("{subject}: tau{}", j + 1);
+            if let Some(tau) = self.tau.get(j) {
+                if let Some((count, level)) =
+                    channels::saturated(tau, joint.limits.effort, &mut self.valid)
+                {
+                    self.warnings.push(Warning::new(
+                        name.clone(),
+                        format!(
+                            "it stands at {level:.6} for {count} samples as a saturated channel does; they \
+                             were left out of the fit"
+                        ),
+                    ));
+                }
+                if let Some(run) = channels::stuck(tau, step, &any, &mut self.valid) {
+                    self.warnings.push(stuck(name, run, step));
+                }
+            }
+            // an encoder that stands still is stuck if the command goes on
+            if let Some(qref) = &self.qref {
+                let awake = channels::moving(&qref[j], step);
+                if let Some(run) = channels::stuck(&self.q[j], step, &awake, &mut self.valid) {
+                    self.warnings
+                        .push(stuck(format!("{subject}: q{}", j + 1), run, step));
+                }
+            }
+        }
+        let bad = self.valid.iter().filter(|v| !**v).count();
+        if 2 * bad > self.valid.len() {
+            self.warnings.push(Warning::new(
+                subject,
+                format!(
+                    "only {} of {} samples are sound in all channels",
+                    self.valid.len() - bad,
+                    self.valid.len()
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    /// Puts all channels on an even grid; with a period, on one that divides it.
+    fn resample(&mut self, clock: &Clock) {
+        let (first, last) = (clock.t[0], clock.t[clock.t.len() - 1]);
+        let mut step = clock.step;
+        if let Some(period) = self.period.filter(|p| *p > 2.0 * step) {
+            step = period / (period / step).round();
+        }
+        let count = ((last - first) / step + 1e-6).floor() as usize + 1;
+        let drift = (step - clock.step).abs() * count as f64;
+        self.step = step;
+        if clock.even && drift <= 0.02 * step && count >= clock.t.len() {
+            self.t = (0..clock.t.len())
+                .map(|i| first + step * i as f64)
+                .collect();
+            return;
+        }
+        let grid: Vec<f64> = (0..count).map(|i| first + step * i as f64).collect();
+        let mut list = self.channels();
+        list.par_iter_mut().for_each(|(_, order, column)| {
+            **column = interpolate(&clock.t, column, &grid, *order);
+        });
+        // a grid point is sound when both neighbours are, and close
+        let mut i = 0;
+        let valid = grid
+            .iter()
+            .map(|&x| {
+                while i + 2 < clock.t.len() && clock.t[i + 1] < x {
+                    i += 1;
+                }
+                let close = clock.t[i + 1] - clock.t[i] <= 2.5 * clock.step;
+                (self.valid[i] && self.valid[i + 1] && close)
+                    || (self.valid[i] && (x - clock.t[i]).abs() < 1e-3 * step)
+            })
+            .collect();
+        self.valid = valid;
+        self.t = grid;
+        self.resampled = true;
+    }
+
+    /// Whether the motion repeats with the period that was stated.
+    fn check_period(&mut self) {
+        let Some((each, count)) = self.periods() else {
+            return;
+        };
+        let subject = self.path.display().to_string();
+        let period = self.period.unwrap_or_default();
+        if count < 2 {
+            self.warnings.push(Warning::new(
+                subject,
+                format!(
+                    "it is {:.3} s long, less than two periods of {period} s: nothing to average",
+                    self.step * self.len() as f64
+                ),
+            ));
+            return;
+        }
+        // scatter against the mean period, relative to the motion, from the second period on
+        let (mut scatter, mut motion) = (0.0, 0.0);
+        for q in &self.q {
+            let from = q.len() - each * (count - 1);
+            for i in 0..each {
+                let values = (0..count - 1).map(|p| q[from + p * each + i]);
+                let mean = values.clone().sum::<f64>() / (count - 1) as f64;
+                let first = q[from - each + i];
+                scatter += values.map(|x| (x - mean) * (x - mean)).sum::<f64>()
+                    + 0.25 * (first - mean).powi(2);
+            }
+            let mean = q.iter().sum::<f64>() / q.len() as f64;
+            motion += q.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+        }
+        if scatter > 0.02 * motion {
+            self.warnings.push(Warning::new(
+                subject,
+                format!(
+                    "the motion does not repeat after the stated period of {period} s (scatter {:.0} % of \
+                     the motion); it is treated as not periodic",
+                    100.0 * (scatter / motion).sqrt()
+                ),
+            ));
+            self.period = None;
+        }
+    }
+}
+
+fn stuck(name: String, (runs, samples, first): (usize, usize, usize), step: f64) -> Warning {
+    Warning::new(
+        name,
+        format!(
+            "it stands still {runs} times, {samples} samples in all, while the robot moves (first at \
+             {:.3} s): stuck or dropped; left out of the fit",
+            first as f64 * step
+        ),
+    )
+}

@@ -1,0 +1,164 @@
+//! Zero-phase Butterworth low-pass in second-order sections.
+//!
+//! The analog prototype `|H(jω)|² = 1/(1 + (ω/ω_c)^{2N})` goes through the bilinear transform with
+//! the cut-off pre-warped (Oppenheim & Schafer, ch. 7). A transfer function of order 8 at 0.5 Hz of
+//! 1 kHz cannot be written in double precision; second-order sections can. Forward and backward
+//! filtering doubles the order and cancels the phase (Gustafsson 1996); the ends are continued by
+//! the record turned about its end points, and the states start as for a constant input, as
+//! `scipy.signal.sosfiltfilt` does. At the cut-off the gain of both passes is one half.
+
+use crate::error::{Error, Result};
+
+/// `y = (b0 + b1 z⁻¹ + b2 z⁻²)/(1 + a1 z⁻¹ + a2 z⁻²) x`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Section {
+    b: [f64; 3],
+    a: [f64; 2],
+}
+
+/// A low-pass filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Butterworth {
+    sections: Vec<Section>,
+    order: usize,
+}
+
+impl Butterworth {
+    /// Low-pass of this order (of one pass) with this cut-off, for this sampling rate, Hz.
+    ///
+    /// # Errors
+    /// An order that is not 1..=16, a cut-off that is not between 0 and half the rate.
+    pub fn low_pass(order: usize, cutoff: f64, rate: f64) -> Result<Self> {
+        if !(1..=16).contains(&order) {
+            return Err(Error::Argument(format!(
+                "a Butterworth filter of order {order}: orders 1 to 16 are possible"
+            )));
+        }
+        if !(cutoff > 0.0 && cutoff < 0.5 * rate) {
+            return Err(Error::Argument(format!(
+                "a cut-off of {cutoff} Hz: it must lie between 0 and half the sampling rate of {rate} Hz"
+            )));
+        }
+        // in units of twice the rate
+        let w = (std::f64::consts::PI * cutoff / rate).tan();
+        let mut sections = Vec::with_capacity(order.div_ceil(2));
+        for k in 0..order / 2 {
+            // pole pair at angle θ from the negative real axis: s² + 2 cos θ w s + w²
+            let theta = std::f64::consts::PI * (2 * k + 1) as f64 / (2 * order) as f64;
+            let damping = 2.0 * theta.sin() * w;
+            let a0 = 1.0 + damping + w * w;
+            sections.push(Section {
+                b: [w * w / a0, 2.0 * w * w / a0, w * w / a0],
+                a: [2.0 * (w * w - 1.0) / a0, (1.0 - damping + w * w) / a0],
+            });
+        }
+        if order % 2 == 1 {
+            let a0 = 1.0 + w;
+            sections.push(Section {
+                b: [w / a0, w / a0, 0.0],
+                a: [(w - 1.0) / a0, 0.0],
+            });
+        }
+        Ok(Butterworth { sections, order })
+    }
+
+    /// Length of the continuation that SciPy uses by default.
+    pub fn default_pad(&self) -> usize {
+        3 * (2 * self.sections.len() + 1 - self.order % 2)
+    }
+
+    /// One pass in place, starting in the steady state of a constant input `x0`.
+    fn pass(&self, x: &mut [f64]) {
+        let Some(&x0) = x.first() else { return };
+        // gain 1 at zero frequency: every section sees the same constant
+        for s in &self.sections {
+            let [b0, b1, b2] = s.b;
+            let [a1, a2] = s.a;
+            let mut z2 = (b2 - a2) * x0;
+            let mut z1 = (b1 - a1) * x0 + z2;
+            for v in x.iter_mut() {
+                let y = b0 * *v + z1;
+                z1 = b1 * *v - a1 * y + z2;
+                z2 = b2 * *v - a2 * y;
+                *v = y;
+            }
+        }
+    }
+
+    /// Both passes, with the ends continued by `pad` samples (less where the record is shorter).
+    pub fn zero_phase(&self, x: &[f64], pad: usize) -> Vec<f64> {
+        let n = x.len();
+        if n < 2 {
+            return x.to_vec();
+        }
+        let pad = pad.min(n - 1);
+        let mut y = Vec::with_capacity(n + 2 * pad);
+        y.extend((1..=pad).rev().map(|i| 2.0 * x[0] - x[i]));
+        y.extend_from_slice(x);
+        y.extend((1..=pad).map(|i| 2.0 * x[n - 1] - x[n - 1 - i]));
+        self.pass(&mut y);
+        y.reverse();
+        self.pass(&mut y);
+        y.reverse();
+        y[pad..pad + n].to_vec()
+    }
+}
+
+/// First derivative by central differences of sixth order, one-sided at the ends. `h` is the step.
+///
+/// The error is `(ωh)⁶/140` of the true derivative.
+pub fn first_derivative(x: &[f64], h: f64) -> Vec<f64> {
+    const C: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
+    stencil(
+        x,
+        |i| {
+            (1..=3)
+                .map(|k| C[k - 1] * (x[i + k] - x[i - k]))
+                .sum::<f64>()
+                / h
+        },
+        1,
+        h,
+    )
+}
+
+/// Second derivative by central differences of sixth order, one-sided at the ends.
+pub fn second_derivative(x: &[f64], h: f64) -> Vec<f64> {
+    const C: [f64; 3] = [1.5, -3.0 / 20.0, 1.0 / 90.0];
+    stencil(
+        x,
+        |i| {
+            // differences first, so that a large constant does not cost digits
+            (1..=3)
+                .map(|k| C[k - 1] * ((x[i + k] - x[i]) - (x[i] - x[i - k])))
+                .sum::<f64>()
+                / (h * h)
+        },
+        2,
+        h,
+    )
+}
+
+/// A stencil of three neighbours on each side; near the ends the parabola through three samples.
+fn stencil(x: &[f64], inner: impl Fn(usize) -> f64, derivative: usize, h: f64) -> Vec<f64> {
+    let n = x.len();
+    (0..n)
+        .map(|i| {
+            if i >= 3 && i + 3 < n {
+                return inner(i);
+            }
+            if n < 3 {
+                return match (derivative, n) {
+                    (1, 2) => (x[1] - x[0]) / h,
+                    _ => 0.0,
+                };
+            }
+            let k = i.clamp(1, n - 2);
+            let bend = (x[k + 1] - 2.0 * x[k] + x[k - 1]) / (h * h);
+            match derivative {
+                2 => bend,
+                _ => (x[k + 1] - x[k - 1]) / (2.0 * h) + bend * (i as f64 - k as f64) * h,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,105 @@
+//! The cut-off of the positions, from their spectrum.
+
+use super::fourier::{spectrum, welch};
+use std::f64::consts::PI;
+
+/// A cut-off and how it was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cutoff {
+    /// Hz
+    pub frequency: f64,
+    /// noise floor of the position, one-sided, units²/Hz
+    pub floor: f64,
+}
+
+/// Relative size below which a spectrum is rounding.
+const ROUNDING: f64 = 1e-28;
+
+/// Frequency that minimises the estimated mean square error of the acceleration: what passes of the
+/// noise plus what is lost of the signal. `density` and `noise` are of the position at `frequency`.
+fn least_error(frequency: &[f64], density: &[f64], noise: impl Fn(usize) -> f64) -> usize {
+    let (mut sum, mut best, mut at) = (0.0, 0.0, 0);
+    for k in 1..frequency.len() {
+        let w4 = (2.0 * PI * frequency[k]).powi(4);
+        sum += (2.0 * noise(k) - density[k]) * w4;
+        if sum < best {
+            best = sum;
+            at = k;
+        }
+    }
+    at.max(1)
+}
+
+/// Cut-off of a motion that does not repeat. The noise floor is the median of the spectrum between
+/// 0.3 and 0.45 of the sampling rate, where the motion of a robot has nothing.
+///
+/// The spectrum is that of the first difference (which has no trend to leak), divided by the
+/// difference's own.
+pub fn aperiodic(q: &[f64], rate: f64) -> Cutoff {
+    let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
+    // a tenth of a hertz to resolve the motion, and at least four windows to average
+    let length = ((10.0 * rate) as usize).clamp(64, (q.len() / 2).max(64));
+    let (f, mut density) = welch(&difference, rate, length);
+    for (f, d) in f.iter().zip(&mut density) {
+        let gain = 2.0 * (PI * f / rate).sin();
+        *d /= (gain * gain).max(1e-300);
+    }
+    density[0] = 0.0;
+    let mut high: Vec<f64> = f
+        .iter()
+        .zip(&density)
+        .filter(|(f, _)| (0.3 * rate..0.45 * rate).contains(f))
+        .map(|(_, d)| *d)
+        .collect();
+    high.sort_by(f64::total_cmp);
+    let largest = density.iter().cloned().fold(0.0, f64::max);
+    // mean of an exponential distribution from its median
+    let floor = high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2;
+    let floor = floor.max(ROUNDING * largest);
+    let k = least_error(&f, &density, |_| floor);
+    // above what was estimated as noise nothing can be seen
+    Cutoff {
+        frequency: f[k].min(0.3 * rate),
+        floor,
+    }
+}
+
+/// Cut-off of the mean of `periods` (each of `samples` positions, joined): the highest harmonic that
+/// is kept. The noise of each harmonic is its scatter between the periods, smoothed over
+/// neighbours.
+pub fn periodic(periods: &[&[f64]], period: f64) -> (usize, Cutoff) {
+    let n = periods.first().map_or(0, |p| p.len());
+    let count = periods.len() as f64;
+    let all: Vec<_> = periods.iter().map(|p| spectrum(p)).collect();
+    let bins = n.div_ceil(2);
+    let scale = 2.0 * period / (n as f64 * n as f64);
+    let frequency: Vec<f64> = (0..bins).map(|k| k as f64 / period).collect();
+    let mut density = vec![0.0; bins];
+    let mut scatter = vec![0.0; bins];
+    for k in 1..bins {
+        let mean = [0, 1].map(|c| all.iter().map(|s| s[k][c]).sum::<f64>() / count);
+        density[k] = scale * (mean[0] * mean[0] + mean[1] * mean[1]);
+        // variance of the mean
+        let spread: f64 = all
+            .iter()
+            .map(|s| (s[k][0] - mean[0]).powi(2) + (s[k][1] - mean[1]).powi(2))
+            .sum();
+        scatter[k] = scale * spread / ((count - 1.0).max(1.0) * count);
+    }
+    let largest = density.iter().cloned().fold(0.0, f64::max);
+    let mut sums = vec![0.0; bins + 1];
+    for k in 0..bins {
+        sums[k + 1] = sums[k] + scatter[k];
+    }
+    let smooth = |k: usize| {
+        let wide = 3 + k / 8;
+        let (a, b) = (k.saturating_sub(wide).max(1), (k + wide + 1).min(bins));
+        ((sums[b] - sums[a]) / (b - a).max(1) as f64).max(ROUNDING * largest)
+    };
+    let k = least_error(&frequency, &density, smooth);
+    let cutoff = Cutoff {
+        frequency: (k as f64 + 0.5) / period,
+        floor: smooth(bins * 3 / 4),
+    };
+    (k, cutoff)
+}

@@ -1,0 +1,215 @@
+//! The filter that torque and regressor pass alike: low-pass and decimation in one.
+//!
+//! `W φ = τ` stays true when the same linear filter is applied to every column of `W` and to `τ`
+//! ("parallel filtering", Gautier 1997). The filter is a windowed sinc of odd length (Kaiser window,
+//! 80 dB), symmetric and therefore without phase: the gain is one half at the cut-off, flat up to
+//! half of it and below 10⁻⁴ from one and a half times it, which is where the decimated rate folds. Of
+//! its outputs only every `factor`-th is computed, and only those whose whole support was measured
+//! count, so that neither ends nor gaps leave a trace.
+
+use std::f64::consts::PI;
+
+/// Low-pass and decimation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decimator {
+    /// gain one half, Hz; infinite for none
+    pub cutoff: f64,
+    /// every so many-th output is kept
+    pub factor: usize,
+    /// weights of the middle and of the neighbours to one side; sums to 1 over both
+    taps: Vec<f64>,
+    /// the same over both sides, in order
+    kernel: Vec<f64>,
+    /// inputs that the outputs stand at
+    at: Vec<usize>,
+    /// whether the signal repeats
+    cyclic: bool,
+    /// number of inputs
+    count: usize,
+}
+
+/// Modified Bessel function of order 0.
+fn bessel(x: f64) -> f64 {
+    let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
+    while term > 1e-17 * sum {
+        term *= (0.5 * x / k) * (0.5 * x / k);
+        sum += term;
+        k += 1.0;
+    }
+    sum
+}
+
+impl Decimator {
+    /// For signals with so many samples at this rate, of which `valid` were measured; `cyclic`
+    /// where the last is followed by the first. An infinite `cutoff` passes everything, and then
+    /// `factor` is 1.
+    pub fn new(cutoff: f64, rate: f64, valid: &[bool], cyclic: bool) -> Self {
+        let count = valid.len();
+        let fraction = cutoff / rate;
+        let all = !(fraction < 0.3) || count == 0;
+        let (factor, taps) = match all {
+            true => (1, vec![1.0]),
+            false => {
+                let factor = ((1.0 / (3.0 * fraction)).floor() as usize).max(1);
+                (factor, kaiser(fraction, count, cyclic))
+            }
+        };
+        let reach = taps.len() - 1;
+        let kernel = taps.iter().skip(1).rev().chain(&taps).copied().collect();
+        // sound samples before each, to see at once whether a whole support is
+        let mut sound = Vec::with_capacity(count + 1);
+        sound.push(0usize);
+        for v in valid {
+            sound.push(sound[sound.len() - 1] + usize::from(*v));
+        }
+        let whole = |from: isize, to: isize| -> bool {
+            let n = count as isize;
+            let range =
+                |a: isize, b: isize| sound[b as usize] - sound[a as usize] == (b - a) as usize;
+            if from >= 0 && to <= n {
+                return range(from, to);
+            }
+            if !cyclic {
+                return false;
+            }
+            let (low, high) = (from.max(0), to.min(n));
+            range(low, high)
+                && (from >= 0 || range((n + from).max(0), n))
+                && (to <= n || range(0, (to - n).min(n)))
+        };
+        let at = (0..count)
+            .step_by(factor)
+            .filter(|&i| whole(i as isize - reach as isize, (i + reach + 1) as isize))
+            .collect();
+        Decimator {
+            cutoff: if all { f64::INFINITY } else { cutoff },
+            factor,
+            taps,
+            kernel,
+            at,
+            cyclic,
+            count,
+        }
+    }
+
+    /// Inputs at which the outputs stand.
+    pub fn at(&self) -> &[usize] {
+        &self.at
+    }
+
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.at.len()
+    }
+
+    /// Inputs to each side that an output depends on.
+    pub fn reach(&self) -> usize {
+        self.taps.len() - 1
+    }
+
+    /// Correlation of the outputs `k` steps apart for white noise at the input.
+    pub fn correlation(&self, k: usize) -> f64 {
+        let (m, lag) = (self.reach() as isize, (k * self.factor) as isize);
+        let tap = |i: isize| match i.unsigned_abs() <= m as usize {
+            true => self.taps[i.unsigned_abs()],
+            false => 0.0,
+        };
+        let sum = |lag: isize| (-m..=m).map(|i| tap(i) * tap(i + lag)).sum::<f64>();
+        sum(lag) / sum(0)
+    }
+
+    /// Filters a signal of `count` samples into `out`, which has [`Decimator::outputs`].
+    ///
+    /// # Panics
+    /// If the lengths differ.
+    pub fn apply_into(&self, x: &[f64], out: &mut [f64]) {
+        assert!(
+            x.len() == self.count && out.len() == self.at.len(),
+            "lengths of signal and filter"
+        );
+        self.apply_range(x, 0, out, 0..self.at.len());
+    }
+
+    /// Outputs `range` from a part of the signal that begins at input `start` and holds their whole
+    /// support.
+    pub(super) fn apply_range(
+        &self,
+        x: &[f64],
+        start: usize,
+        out: &mut [f64],
+        range: std::ops::Range<usize>,
+    ) {
+        let m = self.reach();
+        for (y, &i) in out.iter_mut().zip(&self.at[range]) {
+            let centre = i - start;
+            *y = if centre >= m && centre + m < x.len() {
+                dot(&self.kernel, &x[centre - m..centre + m + 1])
+            } else {
+                // only where the signal repeats
+                let n = x.len();
+                let mut sum = self.taps[0] * x[centre];
+                for (k, w) in self.taps.iter().enumerate().skip(1) {
+                    let k = k % n;
+                    sum += w * (x[(centre + n - k) % n] + x[(centre + k) % n]);
+                }
+                sum
+            };
+        }
+    }
+
+    /// Filters a signal.
+    ///
+    /// # Panics
+    /// If its length is not that of the filter.
+    pub fn apply(&self, x: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; self.at.len()];
+        self.apply_into(x, &mut out);
+        out
+    }
+
+    /// Whether the signal repeats.
+    pub fn cyclic(&self) -> bool {
+        self.cyclic
+    }
+}
+
+/// Inner product in eight partial sums, which the compiler puts side by side.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = ca
+        .remainder()
+        .iter()
+        .zip(cb.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
+    for (x, y) in ca.zip(cb) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    let [s0, s1, s2, s3, s4, s5, s6, s7] = sums;
+    rest + ((s0 + s4) + (s1 + s5)) + ((s2 + s6) + (s3 + s7))
+}
+
+/// Half of a Kaiser-windowed sinc with its cut-off at this fraction of the rate.
+fn kaiser(fraction: f64, count: usize, cyclic: bool) -> Vec<f64> {
+    // 80 dB over a transition as wide as the cut-off
+    const BETA: f64 = 0.1102 * (80.0 - 8.7);
+    let wanted = ((80.0 - 8.0) / (2.285 * 2.0 * PI * fraction) / 2.0).ceil() as usize;
+    let most = if cyclic { count } else { count / 4 };
+    let m = wanted.min(most).max(1);
+    let mut taps: Vec<f64> = (0..=m)
+        .map(|k| {
+            let x = k as f64 / m as f64;
+            let sinc = match k {
+                0 => 2.0 * fraction,
+                _ => (2.0 * PI * fraction * k as f64).sin() / (PI * k as f64),
+            };
+            sinc * bessel(BETA * (1.0 - x * x).max(0.0).sqrt()) / bessel(BETA)
+        })
+        .collect();
+    let sum = taps[0] + 2.0 * taps[1..].iter().sum::<f64>();
+    taps.iter_mut().for_each(|t| *t /= sum);
+    taps
+}

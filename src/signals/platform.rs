@@ -1,0 +1,88 @@
+//! Coordinates of a parallel robot from the positions of its actuators, sample by sample.
+
+use crate::error::{Error, Result};
+use crate::mechanism::task::{from_quaternion, rpy};
+use crate::mechanism::{Mechanism, Task};
+use rayon::prelude::*;
+
+/// Samples between the starts of pieces that are walked on different threads.
+const PIECE: usize = 256;
+
+/// Task coordinates, coordinate-major, of `q[a][i]`, by forward kinematics that starts from the
+/// sample before (from home, for the first). Angles run on through whole turns.
+///
+/// A coarse walk gives the start of every piece; the pieces are walked in parallel.
+///
+/// # Errors
+/// Positions that no pose of the assembly mode gives: the sample and the actuators.
+pub fn forward(mechanism: &Mechanism, q: &[Vec<f64>]) -> Result<Vec<f64>> {
+    let count = q.first().map_or(0, Vec::len);
+    let m = mechanism.freedoms();
+    let at = |i: usize| -> Vec<f64> { q.iter().map(|a| a[i]).collect() };
+    let step = |i: usize, from: &[f64]| {
+        mechanism
+            .forward(&at(i), from)
+            .map(|s| s.x)
+            .map_err(|e| Error::Infeasible(format!("forward kinematics of sample {}: {e}", i + 1)))
+    };
+    let mut starts = vec![mechanism.home.clone()];
+    for piece in 0..count.div_ceil(PIECE) {
+        let x = step(piece * PIECE, &starts[piece])?;
+        starts.push(x);
+    }
+    let pieces: Vec<Vec<f64>> = (0..count.div_ceil(PIECE))
+        .into_par_iter()
+        .map(|piece| {
+            let mut out = Vec::with_capacity(PIECE * m);
+            let mut x = starts[piece + 1].clone();
+            for i in piece * PIECE..((piece + 1) * PIECE).min(count) {
+                x = step(i, &x)?;
+                out.extend_from_slice(&x);
+            }
+            Ok(out)
+        })
+        .collect::<Result<_>>()?;
+    let mut x = vec![0.0; m * count];
+    for (i, row) in pieces.iter().flat_map(|p| p.chunks_exact(m)).enumerate() {
+        for k in 0..m {
+            x[k * count + i] = row[k];
+        }
+    }
+    Ok(x)
+}
+
+/// Task coordinates from measured pose columns `x y z qw qx qy qz`.
+///
+/// # Errors
+/// A mechanism without a platform, or a quaternion that is none.
+pub fn from_pose(mechanism: &Mechanism, pose: &[Vec<f64>]) -> Result<Vec<f64>> {
+    let count = pose.first().map_or(0, Vec::len);
+    let m = mechanism.freedoms();
+    let mut x = vec![0.0; m * count];
+    let mut last: Vec<f64> = mechanism.home.clone();
+    for i in 0..count {
+        let r = from_quaternion([3, 4, 5, 6].map(|k| pose[k][i]))
+            .map_err(|e| Error::Infeasible(format!("pose of sample {}: {e}", i + 1)))?;
+        let angles = rpy(&r);
+        let mut row = vec![pose[0][i], pose[1][i], pose[2][i]];
+        match mechanism.task {
+            Task::Pose => row.extend([angles.x, angles.y, angles.z]),
+            Task::Schoenflies => row.push(angles.z),
+            Task::Translation => {}
+            Task::Joints(_) => {
+                return Err(Error::Argument(
+                    "this mechanism has no platform whose pose could be measured".into(),
+                ));
+            }
+        }
+        for k in 0..m {
+            if mechanism.task.is_angle(k) {
+                let turn = 2.0 * std::f64::consts::PI;
+                row[k] -= turn * ((row[k] - last[k]) / turn).round();
+            }
+            x[k * count + i] = row[k];
+        }
+        last = row;
+    }
+    Ok(x)
+}

@@ -1,0 +1,331 @@
+//! From a record to a [`Prepared`] one.
+
+use super::butterworth::{Butterworth, first_derivative, second_derivative};
+use super::{Decimator, Periods, Prepared, Settings, cutoff, fourier, platform};
+use crate::dynamics::Samples;
+use crate::error::{Error, Result, Warning};
+use crate::log::Record;
+use crate::plant::Plant;
+use faer::Mat;
+use rayon::prelude::*;
+
+/// Continuation of the ends for the Butterworth filter, in periods of its cut-off.
+const PAD: f64 = 3.0;
+
+/// Positions of the coordinates and their two derivatives.
+type Rates = [Vec<f64>; 3];
+
+impl Prepared {
+    /// Prepares a record.
+    ///
+    /// # Errors
+    /// Settings that cannot be, positions that no pose of a parallel robot gives, or no sound
+    /// samples.
+    pub fn new(record: &Record, plant: &Plant, settings: &Settings) -> Result<Prepared> {
+        check(settings, record)?;
+        match record.periods() {
+            Some((samples, count)) if settings.average && count >= 2 => {
+                Self::periodic(record, plant, settings, samples, count)
+            }
+            _ => Self::aperiodic(record, plant, settings),
+        }
+    }
+
+    fn aperiodic(record: &Record, plant: &Plant, settings: &Settings) -> Result<Prepared> {
+        let rate = record.rate();
+        let x = coordinates(record, plant, settings)?;
+        let serial = plant.mechanism().is_none() && settings.measured_rates;
+        let dq = record.dq.as_ref().filter(|_| serial);
+        let ddq = record.ddq.as_ref().filter(|_| serial);
+        let series: Vec<(f64, Rates)> = x
+            .par_iter()
+            .enumerate()
+            .map(|(j, q)| {
+                if let (Some(dq), Some(ddq)) = (dq, ddq) {
+                    let as_is = [q.clone(), dq[j].clone(), ddq[j].clone()];
+                    return Ok((f64::INFINITY, as_is));
+                }
+                let frequency = match settings.position_cutoff {
+                    Some(f) => f,
+                    None => cutoff::aperiodic(q, rate).frequency,
+                };
+                let low = Butterworth::low_pass(settings.order, frequency.min(0.45 * rate), rate)?;
+                let pad = low.default_pad().max((PAD * rate / frequency) as usize);
+                let smooth = low.zero_phase(q, pad);
+                Ok((
+                    frequency,
+                    match dq {
+                        Some(dq) => {
+                            let velocity = low.zero_phase(&dq[j], pad);
+                            let acceleration = first_derivative(&velocity, record.step);
+                            [smooth, velocity, acceleration]
+                        }
+                        None => {
+                            let velocity = first_derivative(&smooth, record.step);
+                            let acceleration = second_derivative(&smooth, record.step);
+                            [smooth, velocity, acceleration]
+                        }
+                    },
+                ))
+            })
+            .collect::<Result<_>>()?;
+        let reason = match (dq, ddq, settings.position_cutoff) {
+            (Some(_), Some(_), _) => "measured velocities and accelerations, taken as they are",
+            (_, _, Some(_)) => "as asked for",
+            (Some(_), None, _) => "least estimated error of the acceleration (measured velocities)",
+            _ => "least estimated error of the acceleration",
+        };
+        let mut valid = record.valid.clone();
+        let frequencies: Vec<f64> = series.iter().map(|s| s.0).collect();
+        // the ends of a smoothed record are continued, not measured
+        let lowest = frequencies.iter().cloned().fold(f64::INFINITY, f64::min);
+        if lowest.is_finite() {
+            let edge = ((0.5 * rate / lowest) as usize).min(valid.len() / 10);
+            let n = valid.len();
+            valid[..edge].fill(false);
+            valid[n - edge..].fill(false);
+        }
+        finish(
+            Prepared {
+                name: record.name.clone(),
+                purpose: record.purpose,
+                rate,
+                time: record.t.clone(),
+                motion: assemble(series.into_iter().map(|s| s.1).collect()),
+                torque: record.tau.concat(),
+                actuators: record.actuators(),
+                valid,
+                periods: None,
+                position_cutoff: frequencies,
+                cutoff_reason: reason.into(),
+                filter: Decimator::new(f64::INFINITY, rate, &[], false),
+                warnings: Vec::new(),
+            },
+            settings,
+        )
+    }
+
+    fn periodic(
+        record: &Record,
+        plant: &Plant,
+        settings: &Settings,
+        samples: usize,
+        count: usize,
+    ) -> Result<Prepared> {
+        let mut warnings = Vec::new();
+        let rate = record.rate();
+        let period = samples as f64 * record.step;
+        // from the end backwards: what is left over is the transient at the beginning
+        let mut from = record.len() - samples * count;
+        let mut count = count;
+        if count > 2 && transient(&record.q, from, samples, count) {
+            warnings.push(Warning::new(
+                record.path.display().to_string(),
+                "the first period differs from the others by more than they do among themselves; it was \
+                 left out of the mean",
+            ));
+            from += samples;
+            count -= 1;
+        }
+        let cut = |channel: &[f64], p: usize| -> Vec<f64> {
+            channel[from + p * samples..from + (p + 1) * samples].to_vec()
+        };
+        let split = |group: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            (0..count)
+                .map(|p| group.iter().flat_map(|c| cut(c, p)).collect())
+                .collect()
+        };
+        // a sample of the mean is sound where it is in every period
+        let valid: Vec<bool> = (0..samples)
+            .map(|i| (0..count).all(|p| record.valid[from + p * samples + i]))
+            .collect();
+        let torque = split(&record.tau);
+        let position = split(&record.q);
+        let x = coordinates(record, plant, settings)?;
+        let series: Vec<(f64, Rates)> = x
+            .par_iter()
+            .map(|q| {
+                let parts: Vec<&[f64]> = (0..count)
+                    .map(|p| &q[from + p * samples..from + (p + 1) * samples])
+                    .collect();
+                let (highest, frequency) = match settings.position_cutoff {
+                    Some(f) => ((f * period).floor().max(1.0) as usize, f),
+                    None => {
+                        let (k, c) = cutoff::periodic(&parts, period);
+                        (k, c.frequency)
+                    }
+                };
+                (
+                    frequency,
+                    fourier::derivatives(&mean(&parts), period, highest),
+                )
+            })
+            .collect();
+        let n = record.actuators();
+        let parts: Vec<&[f64]> = torque.iter().map(Vec::as_slice).collect();
+        let average = mean(&parts);
+        let has_torque = !record.tau.is_empty();
+        let covariance = match has_torque {
+            true => scatter(&torque, &average, n, samples),
+            false => Mat::zeros(n, n),
+        };
+        let places: Vec<&[f64]> = position.iter().map(Vec::as_slice).collect();
+        let noise = scatter(&position, &mean(&places), n, samples);
+        let reason = match settings.position_cutoff {
+            Some(_) => "as asked for",
+            None => {
+                "least estimated error of the acceleration, noise from the scatter of the periods"
+            }
+        };
+        finish(
+            Prepared {
+                name: record.name.clone(),
+                purpose: record.purpose,
+                rate,
+                time: (0..samples).map(|i| i as f64 * record.step).collect(),
+                position_cutoff: series.iter().map(|s| s.0).collect(),
+                motion: assemble(series.into_iter().map(|s| s.1).collect()),
+                torque: if has_torque { average } else { Vec::new() },
+                actuators: n,
+                valid,
+                periods: Some(Periods {
+                    count,
+                    samples,
+                    period,
+                    torque,
+                    position,
+                    torque_covariance: covariance,
+                    position_noise: (0..n).map(|a| noise[(a, a)].sqrt()).collect(),
+                }),
+                cutoff_reason: reason.into(),
+                filter: Decimator::new(f64::INFINITY, rate, &[], true),
+                warnings,
+            },
+            settings,
+        )
+    }
+}
+
+/// Whether the settings can be.
+fn check(settings: &Settings, record: &Record) -> Result<()> {
+    let half = 0.5 * record.rate();
+    if let Some(f) = settings.position_cutoff
+        && !(f > 0.0 && f < half)
+    {
+        return Err(Error::Argument(format!(
+            "a cut-off of {f} Hz for the positions: {} is sampled with {:.6} Hz, so it must lie between 0 \
+             and {half:.6} Hz",
+            record.path.display(),
+            record.rate()
+        )));
+    }
+    if let Some(f) = settings.cutoff
+        && !(f > 0.0)
+    {
+        return Err(Error::Argument(format!(
+            "a cut-off of {f} Hz: it must be positive"
+        )));
+    }
+    Ok(())
+}
+
+/// Chooses the common filter from the cut-offs of the positions.
+fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
+    let highest = p.position_cutoff.iter().cloned().fold(0.0, f64::max);
+    let cutoff = settings.cutoff.unwrap_or(highest);
+    let cyclic = p.periods.is_some();
+    p.filter = Decimator::new(cutoff, p.rate, &p.valid, cyclic);
+    if p.filter.outputs() < 4 {
+        return Err(Error::Infeasible(format!(
+            "{}: after filtering at {cutoff:.3} Hz {} sound samples are left: too many were dropped, or the \
+             cut-off is too low",
+            p.name,
+            p.filter.outputs()
+        )));
+    }
+    Ok(p)
+}
+
+/// Coordinates over the whole record.
+fn coordinates(record: &Record, plant: &Plant, settings: &Settings) -> Result<Vec<Vec<f64>>> {
+    let Some(mechanism) = plant.mechanism() else {
+        return Ok(record.q.clone());
+    };
+    let flat = match (&record.pose, settings.measured_pose) {
+        (Some(pose), true) => platform::from_pose(mechanism, pose)?,
+        (None, true) => {
+            return Err(Error::Argument(format!(
+                "{} has no pose columns x y z qw qx qy qz",
+                record.path.display()
+            )));
+        }
+        _ => platform::forward(mechanism, &record.q)?,
+    };
+    Ok(flat
+        .chunks_exact(record.len())
+        .map(<[f64]>::to_vec)
+        .collect())
+}
+
+fn assemble(series: Vec<Rates>) -> Samples {
+    let count = series.first().map_or(0, |s| s[0].len());
+    let mut out = Samples {
+        dof: series.len(),
+        count,
+        ..Samples::default()
+    };
+    for [q, qd, qdd] in series {
+        out.q.extend(q);
+        out.qd.extend(qd);
+        out.qdd.extend(qdd);
+    }
+    out
+}
+
+fn mean(parts: &[&[f64]]) -> Vec<f64> {
+    let n = parts.first().map_or(0, |p| p.len());
+    (0..n)
+        .map(|i| parts.iter().map(|p| p[i]).sum::<f64>() / parts.len() as f64)
+        .collect()
+}
+
+/// Covariance between channels of the deviations of each period from the mean.
+fn scatter(parts: &[Vec<f64>], mean: &[f64], n: usize, samples: usize) -> Mat<f64> {
+    let freedom = ((parts.len() - 1) * samples).max(1) as f64;
+    Mat::from_fn(n, n, |a, b| {
+        let sum: f64 = parts
+            .iter()
+            .map(|p| {
+                (0..samples)
+                    .map(|i| {
+                        let (u, v) = (a * samples + i, b * samples + i);
+                        (p[u] - mean[u]) * (p[v] - mean[v])
+                    })
+                    .sum::<f64>()
+            })
+            .sum();
+        sum / freedom
+    })
+}
+
+/// Whether the first period is unlike the others.
+fn transient(q: &[Vec<f64>], from: usize, samples: usize, count: usize) -> bool {
+    let far = |a: usize, b: usize| -> f64 {
+        q.iter()
+            .map(|c| {
+                let (a, b) = (from + a * samples, from + b * samples);
+                let range: f64 = c.iter().fold(0.0f64, |m, x| m.max(x.abs())).max(1e-12);
+                (0..samples)
+                    .map(|i| ((c[a + i] - c[b + i]) / range).powi(2))
+                    .sum::<f64>()
+            })
+            .sum()
+    };
+    let first = (1..count).map(|p| far(0, p)).sum::<f64>() / (count - 1) as f64;
+    let pairs: Vec<f64> = (1..count)
+        .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
+        .map(|(a, b)| far(a, b))
+        .collect();
+    let others = pairs.iter().sum::<f64>() / pairs.len().max(1) as f64;
+    first > 9.0 * others + 1e-16 * samples as f64
+}
