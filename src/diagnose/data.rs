@@ -61,6 +61,9 @@ pub struct Data<'a> {
     pub noise: Vec<Noise>,
     /// inertia that an actuator accelerates, about the middle of the motion, kg m² or kg
     pub inertia: Vec<f64>,
+    /// variance of the window over which the torque channel averages, beyond plus and minus one
+    /// sample, in samples squared
+    pub window: f64,
     /// largest speed of each actuator in the fitted records
     pub speed: Vec<f64>,
     /// lowest and highest position of each actuator in the fitted records
@@ -88,6 +91,9 @@ impl<'a> Data<'a> {
     /// # Errors
     /// Poses that cannot be reached.
     pub fn new(plant: &'a Plant, mut records: Vec<Record>) -> Result<Self> {
+        for (k, r) in records.iter_mut().enumerate() {
+            r.order = k;
+        }
         records.sort_by_key(|r| !r.fit);
         let n = plant.actuators().len();
         let mut start = vec![0];
@@ -147,6 +153,7 @@ impl<'a> Data<'a> {
             noise: Vec::new(),
             inertia: inertia(plant, &records[0])?,
             records,
+            window: 0.0,
             speed,
             range,
         };
@@ -208,6 +215,55 @@ impl<'a> Data<'a> {
             self.noise[j].whiten(&x[self.span(k)], &mut out);
         }
         out
+    }
+
+    /// A modelled signal of all records as the torque channel would show it, whitened.
+    pub fn modelled(&self, j: usize, x: &[f64]) -> Vec<f64> {
+        if self.window <= 0.0 {
+            return self.whiten(j, x);
+        }
+        self.whiten(j, &self.windowed(x))
+    }
+
+    /// A modelled signal of all records as the torque channel would show it: passes of the kernel
+    /// `[c/2, 1 − c, c/2]` until their variances sum to the window's.
+    pub fn windowed(&self, x: &[f64]) -> Vec<f64> {
+        let passes = (self.window / 0.3).ceil() as usize;
+        let mut x = x.to_vec();
+        if passes == 0 {
+            return x;
+        }
+        let half = 0.5 * self.window / passes as f64;
+        for _ in 0..passes {
+            for k in 0..self.records.len() {
+                let x = &mut x[self.span(k)];
+                let last = x.len() - 1;
+                let mut before = x[0];
+                for i in 0..=last {
+                    let (here, after) = (x[i], x[(i + 1).min(last)]);
+                    x[i] = here + half * (before - 2.0 * here + after);
+                    before = here;
+                }
+            }
+        }
+        x
+    }
+
+    /// Second differences of a modelled torque: what a wider window would change.
+    pub fn curvature(&self, model: &[Vec<f64>]) -> Column {
+        let rows = model.iter().enumerate().map(|(j, model)| {
+            let mut out = vec![0.0; self.rows()];
+            for k in 0..self.records.len() {
+                let span = self.span(k);
+                for i in span.start + 1..span.end - 1 {
+                    out[i] = 0.5 * (model[i - 1] - 2.0 * model[i] + model[i + 1]);
+                }
+            }
+            (j, out)
+        });
+        Column {
+            rows: rows.collect(),
+        }
     }
 
     fn first_noise(&self, j: usize) -> Noise {
@@ -304,7 +360,7 @@ impl<'a> Data<'a> {
                     let m = robot.bodies[body].inertia.mass().max(0.02 * heaviest).max(1e-3);
                     let l = size(body);
                     let [mass, first, second] = match identified {
-                        true => [0.03, 0.012, 0.015],
+                        true => [0.015, 0.006, 0.008],
                         false => [0.2, 0.1, 0.12],
                     };
                     match k {
@@ -321,11 +377,11 @@ impl<'a> Data<'a> {
                     let speed = j.map_or(1.0, |j| self.speed[j]);
                     let friction = terms[2].abs() + 0.3 * terms[1].abs() * speed;
                     match (term, identified) {
-                        (JointTerm::Armature, true) => 0.08 * value,
+                        (JointTerm::Armature, true) => 0.06 * value,
                         (JointTerm::Armature, false) => 0.3 * value,
                         (JointTerm::Viscous, true) => 0.15 * value,
                         (JointTerm::Viscous, false) => 0.4 * value,
-                        (JointTerm::Coulomb, true) => 0.08 * value,
+                        (JointTerm::Coulomb, true) => 0.06 * value,
                         (JointTerm::Coulomb, false) => 0.35 * value,
                         (JointTerm::Offset, true) => (0.04 * friction).max(0.3 * noise),
                         (JointTerm::Offset, false) => (0.2 * friction).max(noise),
@@ -334,6 +390,50 @@ impl<'a> Data<'a> {
                 }
             })
             .collect()
+    }
+
+    /// Adds a column that every model may use within a prior: an ordinary imperfection.
+    pub fn add_nuisance(&mut self, name: &str, column: &Column, spread: f64) {
+        for j in 0..self.joints() {
+            let (rows, p) = (self.w[j].nrows(), self.w[j].ncols());
+            let values = column.get(j);
+            let old = std::mem::replace(&mut self.w[j], Mat::zeros(0, 0));
+            self.w[j] = Mat::from_fn(rows, p + 1, |i, c| match (c == p, values) {
+                (true, Some(v)) => v[i],
+                (true, None) => 0.0,
+                _ => old[(i, c)],
+            });
+        }
+        self.parameters.push(Parameter {
+            name: name.to_string(),
+            unit: "",
+            value: 0.0,
+            // no joint of the robot: not an unknown of the nominal model
+            kind: Kind::Term {
+                joint: usize::MAX,
+                term: JointTerm::Offset,
+            },
+        });
+        self.spread.push(spread);
+    }
+
+    /// What a log of any robot may have without being at odds with its model: reversals of friction
+    /// that are not perfectly sharp.
+    pub fn ordinary(&mut self) {
+        let n = self.joints();
+        if self.plant.mechanism().is_some() {
+            return;
+        }
+        let robot = self.plant.robot();
+        for j in 0..n {
+            let coulomb = robot.joints[j].terms[2].abs();
+            if coulomb == 0.0 {
+                continue;
+            }
+            let (sharp, wide) = (1e-3 * self.speed[j], 8e-3 * self.speed[j]);
+            let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
+            self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
+        }
     }
 
     /// Torque of the nominal model with parameters `phi`, by actuator, over all records.
@@ -432,7 +532,7 @@ pub fn rigid(
                 })
                 .collect();
             let w = plant.regressor(x)?;
-            let y = &w * faer::ColRef::from_slice(&bodies);
+            let y = &w * faer::ColRef::from_slice(&bodies[..w.ncols()]);
             Ok((0..w.nrows()).map(|i| y[i]).collect())
         }
     }

@@ -114,7 +114,7 @@ impl<'a> Evidence<'a> {
                     if from.iter().all(|v| *v == 0.0) {
                         continue;
                     }
-                    for (i, v) in data.whiten(j, &from).into_iter().enumerate() {
+                    for (i, v) in data.modelled(j, &from).into_iter().enumerate() {
                         out[(i, c)] = v;
                     }
                 }
@@ -125,7 +125,8 @@ impl<'a> Evidence<'a> {
         let r: Vec<Vec<f64>> = (0..n)
             .into_par_iter()
             .map(|j| {
-                let raw: Vec<f64> = data.tau[j].iter().zip(&nominal[j]).map(|(a, b)| a - b).collect();
+                let model = data.windowed(&nominal[j]);
+                let raw: Vec<f64> = data.tau[j].iter().zip(&model).map(|(a, b)| a - b).collect();
                 data.whiten(j, &raw)
             })
             .collect();
@@ -190,45 +191,72 @@ impl<'a> Evidence<'a> {
 
     /// Whitens and reduces columns.
     pub fn project(&self, columns: &[Column]) -> Projected {
+        self.project_all(std::slice::from_ref(&columns.to_vec()))
+            .pop()
+            .expect("one set in, one out")
+    }
+
+    /// Whitens and reduces several sets of columns at once, which is several times faster.
+    pub fn project_all(&self, sets: &[Vec<Column>]) -> Vec<Projected> {
         let fitted = self.data.fitted;
-        let (p, k) = (self.d.len(), columns.len());
-        let z: Vec<Column> = columns
+        let p = self.d.len();
+        let z: Vec<Vec<Column>> = sets
             .iter()
-            .map(|c| Column {
-                rows: c
-                    .rows
-                    .iter()
-                    .map(|(j, v)| (*j, self.data.whiten(*j, v)))
-                    .collect(),
+            .map(|columns| {
+                let whiten = |c: &Column| Column {
+                    rows: c
+                        .rows
+                        .iter()
+                        .map(|(j, v)| (*j, self.data.modelled(*j, v)))
+                        .collect(),
+                };
+                columns.iter().map(whiten).collect()
             })
             .collect();
-        let mut c = Mat::zeros(p, k);
-        let mut b = vec![0.0; k];
-        for (i, column) in z.iter().enumerate() {
-            for (j, v) in &column.rows {
-                let v = &v[..fitted];
+        let flat: Vec<&Column> = z.iter().flatten().collect();
+        let mut c = Mat::<f64>::zeros(p, flat.len());
+        let mut b = vec![0.0; flat.len()];
+        for j in 0..self.data.joints() {
+            let here: Vec<(usize, &[f64])> = flat
+                .iter()
+                .enumerate()
+                .filter_map(|(i, c)| Some((i, &c.get(j)?[..fitted])))
+                .collect();
+            if here.is_empty() {
+                continue;
+            }
+            let block = Mat::from_fn(fitted, here.len(), |r, i| here[i].1[r]);
+            let part = self.q[j].subrows(0, fitted).transpose() * &block;
+            for (k, (i, v)) in here.iter().enumerate() {
                 for m in 0..p {
-                    let q = self.q[*j].col(m);
-                    let q = q.try_as_col_major().expect("column major").as_slice();
-                    c[(m, i)] += dot(&q[..fitted], v);
+                    c[(m, *i)] += part[(m, k)];
                 }
-                b[i] += dot(v, &self.r[*j][..fitted]);
-            }
-            for m in 0..p {
-                b[i] -= c[(m, i)] * self.d[m];
+                b[*i] += dot(v, &self.r[j][..fitted]);
             }
         }
-        let mut raw = Mat::zeros(k, k);
-        let mut s = Mat::zeros(k, k);
-        for i in 0..k {
-            for m in 0..=i {
-                let full = overlap(&z[i], &z[m], fitted);
-                let absorbed: f64 = (0..p).map(|r| c[(r, i)] * c[(r, m)]).sum();
-                (raw[(i, m)], raw[(m, i)]) = (full, full);
-                (s[(i, m)], s[(m, i)]) = (full - absorbed, full - absorbed);
-            }
+        for (i, b) in b.iter_mut().enumerate() {
+            *b -= (0..p).map(|m| c[(m, i)] * self.d[m]).sum::<f64>();
         }
-        Projected { z, c, raw, s, b }
+        let mut at = 0;
+        z.into_iter()
+            .map(|z| {
+                let k = z.len();
+                let c = c.subcols(at, k).to_owned();
+                let b = b[at..at + k].to_vec();
+                at += k;
+                let mut raw = Mat::zeros(k, k);
+                let mut s = Mat::zeros(k, k);
+                for i in 0..k {
+                    for m in 0..=i {
+                        let full = overlap(&z[i], &z[m], fitted);
+                        let absorbed: f64 = (0..p).map(|r| c[(r, i)] * c[(r, m)]).sum();
+                        (raw[(i, m)], raw[(m, i)]) = (full, full);
+                        (s[(i, m)], s[(m, i)]) = (full - absorbed, full - absorbed);
+                    }
+                }
+                Projected { z, c, raw, s, b }
+            })
+            .collect()
     }
 
     /// `Z₁ᵀ R Z₂`.

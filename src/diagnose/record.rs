@@ -56,6 +56,8 @@ pub struct Record {
     pub position_noise: Vec<f64>,
     /// highest frequency with motion in it, Hz
     pub band: f64,
+    /// place in the experiment file
+    pub order: usize,
     /// remarks for the report
     pub remarks: Vec<String>,
 }
@@ -82,18 +84,26 @@ impl Record {
         &self.actuators.qdd[j * self.count..(j + 1) * self.count]
     }
 
-    /// Brings a raw log onto its grid.
+    /// Brings a raw log onto its grid. `likely` are periods of other records, tried where it states
+    /// none.
     ///
     /// # Errors
     /// A record that is too short, or poses of a parallel robot that cannot be reached.
-    pub fn prepare(plant: &Plant, raw: &Raw) -> Result<Self> {
+    pub fn prepare(plant: &Plant, raw: &Raw, likely: &[f64]) -> Result<Self> {
         let n = plant.actuators().len();
         let mut remarks = Vec::new();
         let total = raw.t.len();
         let span = raw.t[total - 1] - raw.t[0];
         let mean = span / (total - 1) as f64;
         // a repeating record is cut to whole periods on a grid that divides the period
-        let (dt, count, cycle) = match raw.period {
+        let period = raw.period.or_else(|| {
+            let found = likely.iter().copied().find(|p| repeats(raw, mean, *p));
+            if found.is_some() {
+                remarks.push("it repeats with the period of another record".to_string());
+            }
+            found
+        });
+        let (dt, count, cycle) = match period {
             Some(period) if span + 1.5 * mean >= 1.0 * period => {
                 let whole = ((span + 1.5 * mean) / period).floor().max(1.0) as usize;
                 let mut per = (period / mean).round() as usize;
@@ -163,9 +173,27 @@ impl Record {
             tau,
             position_noise,
             band,
+            order: 0,
             remarks,
         })
     }
+}
+
+/// Whether a record repeats after `period`: at least two of them, and the positions one period
+/// apart differ by less than a thousandth of their range.
+fn repeats(raw: &Raw, mean: f64, period: f64) -> bool {
+    let lag = (period / mean).round() as usize;
+    let n = raw.t.len();
+    if lag == 0 || 2 * lag > n + lag / 10 {
+        return false;
+    }
+    raw.q.iter().all(|q| {
+        let (lo, hi) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (a.min(*v), b.max(*v))
+        });
+        let apart: f64 = (0..n - lag).map(|i| (q[i + lag] - q[i]).powi(2)).sum();
+        (apart / (n - lag) as f64).sqrt() < 1e-3 * (hi - lo).max(1e-9)
+    })
 }
 
 /// A column at `count` times `0, dt, …` after the first stamp: by its stamps, or by its number

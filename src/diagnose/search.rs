@@ -73,18 +73,42 @@ pub fn best_shape(
 ) -> Option<Candidate> {
     let effect = effects[which].as_ref();
     let mut best: Option<(f64, Vec<f64>)> = None;
-    for shape in effect.shapes(cx, place) {
-        let tried = try_shape(evidence, cx, effect, place, &shape, beside, before, true);
-        if let Some((gain, ..)) = tried
-            && best.as_ref().is_none_or(|b| gain > b.0)
+    for shapes in effect.shapes(cx, place).chunks(8) {
+        let sets: Vec<_> = shapes
+            .iter()
+            .map(|s| effect.columns(cx, place, s, true))
+            .collect();
+        if sets
+            .iter()
+            .any(|s| s.is_empty() || s.iter().any(|c| c.rows.is_empty()))
         {
-            best = Some((gain, shape));
+            continue;
+        }
+        for (projected, shape) in evidence.project_all(&sets).iter().zip(shapes) {
+            let mut set = beside.to_vec();
+            set.push(projected);
+            let fit = evidence.fit(&set);
+            let eta = &fit.eta[fit.eta.len() - projected.z.len()..];
+            let gain = fit.gain - before.gain;
+            if gain.is_finite()
+                && effect.plausible(cx, place, shape, eta)
+                && best.as_ref().is_none_or(|b| gain > b.0)
+            {
+                best = Some((gain, shape.clone()));
+            }
         }
     }
     let (gain, mut shape) = best?;
     // between grid points
     if gain > 20.0 {
         let mut top = gain;
+        let grid = effect.shapes(cx, place);
+        let bounds: Vec<[f64; 2]> = (0..shape.len())
+            .map(|k| {
+                let ends = grid.iter().map(|s| s[k]).filter(|v| v.signum() == shape[k].signum());
+                ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| [a.min(v.abs()), b.max(v.abs())])
+            })
+            .collect();
         for step in [1.3f64, 1.12, 1.05] {
             for k in 0..shape.len() {
                 if !effect.refinable(k) {
@@ -94,6 +118,9 @@ pub fn best_shape(
                     loop {
                         let mut next = shape.clone();
                         next[k] *= factor;
+                        if next[k].abs() < bounds[k][0] / 1.5 || next[k].abs() > bounds[k][1] * 1.2 {
+                            break;
+                        }
                         let tried =
                             try_shape(evidence, cx, effect, place, &next, beside, before, true);
                         match tried {

@@ -82,8 +82,9 @@ fn legs(cx: &Context) -> Option<Vec<Column>> {
     Some(
         columns
             .into_iter()
-            .map(|rows| prune(Column { rows: rows.into_iter().enumerate().collect() }, 0))
-            .filter(|c| !c.rows.is_empty())
+            .map(|rows| Column {
+                rows: rows.into_iter().enumerate().collect(),
+            })
             .collect(),
     )
 }

@@ -22,7 +22,7 @@ impl Effect for PreslidingHysteresis {
 
     fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
         let [a, b] = cx.data.range[place[0]];
-        let grid = ladder(5e-4 * (b - a), 0.15 * (b - a), 9);
+        let grid = ladder(6e-4 * (b - a), 0.15 * (b - a), 9);
         let with = |form: f64| grid.iter().map(move |s| vec![*s, form]);
         with(0.0).chain(with(1.0)).chain(with(2.0)).collect()
     }

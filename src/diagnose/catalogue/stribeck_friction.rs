@@ -22,7 +22,7 @@ impl Effect for StribeckFriction {
 
     fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
         let v = cx.data.speed[place[0]];
-        let grid = ladder(0.004 * v, 0.3 * v, 9);
+        let grid = ladder(0.006 * v, 0.2 * v, 9);
         let with = |d: f64| grid.iter().map(move |v| vec![*v, d]);
         with(1.0).chain(with(2.0)).collect()
     }

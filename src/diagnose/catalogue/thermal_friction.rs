@@ -21,22 +21,42 @@ impl Effect for ThermalFriction {
     }
 
     fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        [3.0, 8.0, 20.0, 60.0, 200.0].map(|t| vec![t]).to_vec()
+        let times = [5.0, 15.0, 40.0, 100.0, 300.0];
+        let with = |lasts: f64| times.iter().map(move |t| vec![*t, lasts]);
+        with(1.0).chain(with(0.0)).collect()
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k == 0
     }
 
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
         let j = place[0];
-        // warmth from the power of friction, cold at the start of every record
-        let warmth = cx.data.each(|r, _| {
+        // warmth from the power of friction; it lasts from record to record in the order of the
+        // experiment, or every record starts cold
+        let actuator = cx.data.plant.actuators()[j];
+        let top = cx.data.speed[j];
+        let [_, viscous, coulomb, _] = actuator.terms;
+        let (fc, fv) = match coulomb + viscous > 0.0 {
+            true => (coulomb, viscous * top),
+            false => (1.0, 1.0),
+        };
+        let power = |v: f64| (fc * v.abs() / top + fv * (v / top).powi(2)) / (fc + fv);
+        let mut order: Vec<usize> = (0..cx.data.records.len()).collect();
+        order.sort_by_key(|k| cx.data.records[*k].order);
+        let mut warmth = vec![0.0; cx.data.rows()];
+        let mut warm = 0.0;
+        for k in order {
+            let r = &cx.data.records[k];
+            if shape[1] == 0.0 {
+                warm = 0.0;
+            }
             let (_, v) = r.state(j);
-            let mut warm = 0.0;
-            v.iter()
-                .map(|v| {
-                    warm += r.dt / shape[0] * (v.abs() / cx.data.speed[j] - warm);
-                    warm
-                })
-                .collect()
-        });
+            for (to, v) in warmth[cx.data.span(k)].iter_mut().zip(v) {
+                warm += r.dt / shape[0] * (power(*v) - warm);
+                *to = warm;
+            }
+        }
         let times = |x: Vec<f64>| x.iter().zip(&warmth).map(|(x, w)| x * w).collect();
         vec![
             Column::on(j, times(cx.sign(j))),
@@ -60,6 +80,7 @@ impl Effect for ThermalFriction {
             value("coulomb_change", eta[0], std[0], cx.torque_unit(place[0])),
             value("viscous_change", eta[1], std[1], unit),
             constant("time_constant", shape[0], "s"),
+            constant("lasts_over_records", shape[1], ""),
         ]
     }
 }

@@ -27,7 +27,7 @@ impl Effect for TorqueDelay {
     fn shapes(&self, cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
         let dt = cx.data.records[0].dt;
         let mut all: Vec<Vec<f64>> = Vec::new();
-        for d in [0.12, 0.25, 0.5, 0.8, 1.2, 1.8, 2.5, 3.5] {
+        for d in [0.4, 0.7, 1.0, 1.4, 2.0, 3.0] {
             all.push(vec![d * dt]);
             all.push(vec![-d * dt]);
         }
@@ -53,7 +53,7 @@ impl Effect for TorqueDelay {
     }
 
     fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
-        eta[0] > 0.4 && eta[0] < 2.5
+        eta[0] > 0.5 && eta[0] < 1.6
     }
 
     fn values(
