@@ -58,7 +58,9 @@ pub mod design;
 pub mod diagnose;
 pub mod dynamics;
 pub mod error;
+pub mod estimate;
 pub mod identifiability;
+pub mod load;
 pub mod log;
 pub mod mechanism;
 pub mod output;
@@ -67,6 +69,7 @@ pub mod regressor;
 pub mod report;
 pub mod robot;
 pub mod signals;
+pub mod simulate;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning};

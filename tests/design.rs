@@ -39,7 +39,7 @@ fn small(starts: usize) -> Settings {
 }
 
 /// A random point and the information matrix of a robot with all joint columns.
-fn problem(seed: u64, condition: Condition) -> (Information, Vec<f64>) {
+fn problem(seed: u64, condition: Condition) -> (Information<'static>, Vec<f64>) {
     let robot = common::robot(seed, 4, false).with_terms(&JointTerm::ALL);
     let base = BaseParameters::new(&robot).unwrap();
     let basis = Basis::new(&[1, 2, 3], Ends::Rest, robot.dof(), None).unwrap();

@@ -4,8 +4,11 @@
 mod design;
 mod diagnose;
 mod identifiability;
+mod identify;
+mod load;
 mod new;
 mod robots;
+mod simulate;
 mod summary;
 mod torque;
 
@@ -35,10 +38,16 @@ enum Command {
     Design(design::Args),
     /// Report what a robot, and a trajectory on it, can identify
     Identifiability(identifiability::Args),
+    /// Identify the model from recorded runs
+    Identify(identify::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
     /// Diagnose
     Diagnose(diagnose::Args),
+    /// Rehearse an experiment: simulate the robot and write a log
+    Simulate(simulate::Args),
+    /// Identify the load that a robot carries
+    Load(load::Args),
     /// List the bundled robots
     Robots(robots::Args),
     /// Print a commented robot.toml for a URDF
@@ -51,8 +60,11 @@ pub fn main() -> ExitCode {
     let done = match cli.command {
         Command::Design(a) => design::run(a),
         Command::Identifiability(a) => identifiability::run(a),
+        Command::Identify(a) => identify::run(a),
         Command::Torque(a) => torque::run(a),
         Command::Diagnose(a) => diagnose::run(a),
+        Command::Simulate(a) => simulate::run(a),
+        Command::Load(a) => load::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
     };

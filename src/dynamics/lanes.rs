@@ -137,7 +137,7 @@ impl Lanes for Portable4 {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 mod x86 {
     use super::*;
     use std::arch::x86_64::*;
@@ -252,7 +252,7 @@ mod x86 {
         "Eight samples in an AVX-512 register."
     );
 }
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 pub use x86::{Avx2, Avx512};
 
 /// Instruction set that a kernel is run with.
@@ -263,17 +263,17 @@ pub enum Isa {
     /// packs of four without special instructions
     Portable,
     /// packs of four
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", feature = "wide"))]
     Avx2,
     /// packs of eight
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", feature = "wide"))]
     Avx512,
 }
 
 impl Isa {
     /// The widest that this machine has.
     pub fn detect() -> Isa {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", feature = "wide"))]
         {
             if std::arch::is_x86_feature_detected!("avx512f")
                 && std::arch::is_x86_feature_detected!("avx512dq")
@@ -291,9 +291,9 @@ impl Isa {
     pub fn is_available(self) -> bool {
         match self {
             Isa::Scalar | Isa::Portable => true,
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx512 => {
                 std::arch::is_x86_feature_detected!("avx512f")
                     && std::arch::is_x86_feature_detected!("avx512dq")
@@ -304,8 +304,9 @@ impl Isa {
 
     /// All that this machine can run.
     pub fn available() -> Vec<Isa> {
+        #[cfg_attr(not(all(target_arch = "x86_64", feature = "wide")), allow(unused_mut))]
         let mut all = vec![Isa::Scalar, Isa::Portable];
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", feature = "wide"))]
         {
             if std::arch::is_x86_feature_detected!("avx2") {
                 all.push(Isa::Avx2);
@@ -322,9 +323,9 @@ impl Isa {
         match self {
             Isa::Scalar => 1,
             Isa::Portable => 4,
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx2 => 4,
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx512 => 8,
         }
     }

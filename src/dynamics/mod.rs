@@ -120,9 +120,9 @@ pub struct Workspace {
     isa: Isa,
     one: Scratch<f64>,
     portable: Scratch<Portable4>,
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", feature = "wide"))]
     avx2: Scratch<lanes::Avx2>,
-    #[cfg(target_arch = "x86_64")]
+    #[cfg(all(target_arch = "x86_64", feature = "wide"))]
     avx512: Scratch<lanes::Avx512>,
 }
 
@@ -151,9 +151,9 @@ impl Workspace {
             isa,
             one: Scratch::default(),
             portable: Scratch::default(),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             avx2: Scratch::default(),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             avx512: Scratch::default(),
         }
     }
@@ -181,7 +181,7 @@ unsafe fn sweep<L: Lanes, J: Job>(job: &J, from: usize, to: usize, s: &mut Scrat
     i
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 #[target_feature(enable = "avx2")]
 unsafe fn sweep_avx2<J: Job>(
     job: &J,
@@ -193,7 +193,7 @@ unsafe fn sweep_avx2<J: Job>(
     unsafe { sweep(job, from, to, s) }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 #[target_feature(enable = "avx512f,avx512dq")]
 unsafe fn sweep_avx512<J: Job>(
     job: &J,
@@ -213,9 +213,9 @@ fn run<J: Job>(job: &J, from: usize, to: usize, ws: &mut Workspace) {
         let done = match ws.isa {
             Isa::Scalar => from,
             Isa::Portable => sweep(job, from, to, &mut ws.portable),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx2 => sweep_avx2(job, from, to, &mut ws.avx2),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx512 => {
                 let done = sweep_avx512(job, from, to, &mut ws.avx512);
                 sweep_avx2(job, done, to, &mut ws.avx2)

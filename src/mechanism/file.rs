@@ -8,6 +8,7 @@ mod body;
 mod chains;
 mod common;
 mod legs;
+mod loops;
 
 use super::{Mechanism, bundled};
 use crate::error::{Error, Result};
@@ -20,10 +21,11 @@ use std::path::Path;
 type Reader = fn(Text, &Path) -> Result<Mechanism>;
 
 /// Every kind, by what `mechanism = …` says.
-const KINDS: [(&str, Reader); 3] = [
+const KINDS: [(&str, Reader); 4] = [
     ("gough-stewart", legs::read),
     ("h4", chains::read_h4),
     ("delta", chains::read_delta),
+    ("loops", loops::read),
 ];
 
 /// Names of all kinds.
@@ -37,8 +39,9 @@ pub fn is_mechanism(text: &str) -> bool {
 }
 
 impl Mechanism {
-    /// Reads a parallel robot: the path of its `robot.toml`, or a bundled name. A file of that name
-    /// wins over a bundled robot. `None` where this is no parallel robot: then
+    /// Reads a parallel robot: the path of its `robot.toml`, a bundled name, or (of the collection
+    /// `example-parallel-robots`, see [`loops::yaml`](super::loops::yaml)) a `robot.yaml` or the
+    /// folder that holds it beside its URDF. A file of that name wins over a bundled robot. `None` where this is no parallel robot: then
     /// [`Robot::load`](crate::Robot::load) may know it.
     ///
     /// # Errors
@@ -46,7 +49,12 @@ impl Mechanism {
     /// line), and what [`Mechanism::new`] finds.
     pub fn load(spec: &str) -> Result<Option<Mechanism>> {
         let path = Path::new(spec);
-        if !path.is_dir() && path.exists() {
+        if path.is_dir() {
+            let yaml = path.join("robot.yaml");
+            if yaml.is_file() {
+                return load_path(&yaml);
+            }
+        } else if path.exists() {
             return load_path(path);
         }
         bundled::find(spec).map(|b| b.load()).transpose()
@@ -64,6 +72,14 @@ impl Mechanism {
 }
 
 fn load_path(path: &Path) -> Result<Option<Mechanism>> {
+    let is_yaml = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
+    if is_yaml {
+        let mut mechanism = loops::read_yaml(path)?;
+        mechanism.robot.path = Some(path.to_path_buf());
+        return Ok(Some(mechanism));
+    }
     let is_toml = path
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"));

@@ -14,7 +14,9 @@
 
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
-use crate::dynamics::lanes::{self, Isa, Lanes, Portable4};
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
+use crate::dynamics::lanes;
+use crate::dynamics::lanes::{Isa, Lanes, Portable4};
 use nalgebra::{DMatrix, Vector3};
 
 /// Takes the tree coordinates one by one, in any order.
@@ -121,6 +123,12 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
         None
     }
 
+    /// Where the task coordinates are joints: which of the tree coordinates they are. `None`: the
+    /// first actuators.
+    fn task_joints(&self) -> Option<&[usize]> {
+        None
+    }
+
     /// Whether each sample starts from the solution of the one before, so that a batch must not be
     /// cut into pieces.
     fn sequential(&self) -> bool {
@@ -150,14 +158,14 @@ unsafe fn sweep<L: Lanes, P: Pass>(pass: &P, from: usize, to: usize) -> usize {
     s
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 #[target_feature(enable = "avx2")]
 unsafe fn sweep_avx2<P: Pass>(pass: &P, from: usize, to: usize) -> usize {
     // SAFETY: the caller made sure of AVX2
     unsafe { sweep::<lanes::Avx2, P>(pass, from, to) }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
 #[target_feature(enable = "avx512f,avx512dq")]
 unsafe fn sweep_avx512<P: Pass>(pass: &P, from: usize, to: usize) -> usize {
     // SAFETY: the caller made sure of AVX-512
@@ -178,9 +186,9 @@ pub(crate) unsafe fn run<P: Pass>(isa: Isa, pass: &P, count: usize) {
         let done = match isa {
             Isa::Scalar => 0,
             Isa::Portable => sweep::<Portable4, P>(pass, 0, count),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx2 => sweep_avx2(pass, 0, count),
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
             Isa::Avx512 => {
                 let done = sweep_avx512(pass, 0, count);
                 done + if count - done >= 4 {

@@ -28,6 +28,7 @@ pub mod geometry;
 pub mod gough_stewart;
 pub mod h4;
 pub mod interval;
+pub mod loops;
 pub mod margins;
 mod motion_file;
 pub mod parallelogram;
@@ -152,7 +153,10 @@ impl Mechanism {
             )));
         }
         let task_names: Vec<String> = match task {
-            Task::Joints(_) => geometry_joint_names(&robot, &actuated, freedoms),
+            Task::Joints(_) => match geometry.task_joints() {
+                Some(joints) => geometry_joint_names(&robot, joints, freedoms),
+                None => geometry_joint_names(&robot, &actuated, freedoms),
+            },
             _ => task.names().iter().map(|n| n.to_string()).collect(),
         };
         let (parameters, mut warnings) = Parameters::new(&mut robot, &groups);
@@ -285,7 +289,11 @@ impl Mechanism {
     pub fn task_robot(&self) -> Robot {
         let joints = self.task_names.iter().enumerate().map(|(k, name)| {
             let angle = match self.task {
-                Task::Joints(_) => self.robot.joints[self.actuated[k]].motion == Motion::Revolute,
+                Task::Joints(_) => {
+                    let joints = self.geometry.task_joints().unwrap_or(&self.actuated);
+                    let joint = joints.get(k).and_then(|&j| self.robot.joints.get(j));
+                    joint.is_some_and(|j| j.motion == Motion::Revolute)
+                }
                 _ => self.task.is_angle(k),
             };
             let motion = match angle {
@@ -347,7 +355,7 @@ impl Mechanism {
     }
 }
 
-/// Joints that serve as task coordinates: the first `n` actuators.
+/// Names of the joints that serve as task coordinates: the first `n` of these.
 fn geometry_joint_names(robot: &Robot, actuated: &[usize], n: usize) -> Vec<String> {
     actuated
         .iter()

@@ -73,7 +73,7 @@ impl Robot {
         if spec.trim().is_empty() {
             return Err(Error::Argument(format!(
                 "no robot is named; give a robot.toml, a .urdf, or one of {}",
-                bundled::names().join(", ")
+                all_bundled().collect::<Vec<_>>().join(", ")
             )));
         }
         let path = Path::new(spec);
@@ -111,8 +111,8 @@ impl Robot {
         }
         Err(Error::Argument(format!(
             "`{spec}` is neither a file nor a bundled robot{}; bundled are {}",
-            did_you_mean(spec, bundled::names()),
-            bundled::names().join(", ")
+            did_you_mean(spec, all_bundled()),
+            all_bundled().collect::<Vec<_>>().join(", ")
         )))
     }
 
@@ -157,6 +157,12 @@ impl Robot {
     pub fn to_toml_template(&self, urdf: &str) -> String {
         template::template(self, urdf)
     }
+}
+
+/// Names of all bundled robots, parallel ones included.
+fn all_bundled() -> impl Iterator<Item = &'static str> {
+    let parallel = mechanism::bundled::list().iter().map(|b| b.name);
+    bundled::names().into_iter().chain(parallel)
 }
 
 /// The file at this path, as text.

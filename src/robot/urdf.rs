@@ -91,6 +91,53 @@ impl Urdf {
         Some(joint.kind == Kind::Fixed)
     }
 
+    /// Where a link sits on the body that carries it: the name of that body (`None`: the base) and
+    /// its pose there. `is_body` tells the links that move on a joint of their own from those that
+    /// are fixed, or held where `lock` says. `None` where there is no such link.
+    pub fn frame(
+        &self,
+        link: &str,
+        is_body: impl Fn(&str) -> bool,
+        lock: &BTreeMap<String, f64>,
+    ) -> Option<(Option<String>, Matrix3<f64>, Vector3<f64>)> {
+        self.links.iter().find(|l| l.name == link)?;
+        let (mut rotation, mut position) = (Matrix3::identity(), Vector3::zeros());
+        let mut at = link.to_string();
+        for _ in 0..=self.joints.len() {
+            if is_body(&at) {
+                return Some((Some(at), rotation, position));
+            }
+            let Some(joint) = self.joints.iter().find(|j| j.child == at) else {
+                return Some((None, rotation, position));
+            };
+            let held = match (lock.get(&joint.name), &joint.mimic) {
+                (Some(q), _) => *q,
+                (None, Some(m)) => {
+                    m.multiplier * lock.get(&m.joint).copied().unwrap_or(0.0) + m.offset
+                }
+                (None, None) => 0.0,
+            };
+            let (turn, slide) = match joint.kind {
+                Kind::Fixed => (Matrix3::identity(), Vector3::zeros()),
+                Kind::Prismatic => (Matrix3::identity(), joint.axis * held),
+                _ => {
+                    let axis = nalgebra::Unit::new_unchecked(joint.axis);
+                    let turn = nalgebra::Rotation3::from_axis_angle(&axis, held);
+                    (turn.into_inner(), Vector3::zeros())
+                }
+            };
+            position = joint.position + joint.rotation * (slide + turn * position);
+            rotation = joint.rotation * turn * rotation;
+            at.clone_from(&joint.parent);
+        }
+        None
+    }
+
+    /// Names of all links, in document order.
+    pub fn link_names(&self) -> impl Iterator<Item = &str> {
+        self.links.iter().map(|l| l.name.as_str())
+    }
+
     /// The joint that this one mimics according to the file.
     pub fn mimics(&self, joint: &str) -> Option<&str> {
         let joint = self.joints.iter().find(|j| j.name == joint)?;

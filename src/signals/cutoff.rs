@@ -30,6 +30,31 @@ fn least_error(frequency: &[f64], density: &[f64], noise: impl Fn(usize) -> f64)
     at.max(1)
 }
 
+/// Frequency below which 99.99 % of the power of the position's changes lies, Hz: the band of the
+/// motion. A hundredth of the amplitude lies above it.
+pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
+    let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
+    let length = ((20.0 * rate) as usize).clamp(64, difference.len().max(64));
+    let (f, density) = welch(&difference, rate, length);
+    let position: Vec<f64> = f
+        .iter()
+        .zip(&density)
+        .map(|(f, d)| {
+            let gain = 2.0 * (PI * f / rate).sin();
+            if *f > 0.0 { d / (gain * gain) } else { 0.0 }
+        })
+        .collect();
+    let total: f64 = position.iter().sum();
+    let mut sum = 0.0;
+    for (f, d) in f.iter().zip(&position) {
+        sum += d;
+        if *f > 0.0 && sum >= 0.9999 * total {
+            return *f;
+        }
+    }
+    0.5 * rate
+}
+
 /// Cut-off of a motion that does not repeat. The noise floor is the median of the spectrum between
 /// 0.3 and 0.45 of the sampling rate, where the motion of a robot has nothing.
 ///

@@ -127,33 +127,50 @@ impl Decimator {
             x.len() == self.count && out.len() == self.at.len(),
             "lengths of signal and filter"
         );
-        self.apply_range(x, 0, out, 0..self.at.len());
+        let m = self.reach();
+        for (y, &i) in out.iter_mut().zip(&self.at) {
+            *y = match i >= m && i + m < x.len() {
+                true => dot(&self.kernel, &x[i - m..=i + m]),
+                // only where the signal repeats
+                false => {
+                    let n = x.len();
+                    let wrapped = |k: usize| x[(i + n * (m / n + 1) + k - m) % n];
+                    self.kernel
+                        .iter()
+                        .enumerate()
+                        .map(|(k, w)| w * wrapped(k))
+                        .sum()
+                }
+            };
+        }
     }
 
-    /// Outputs `range` from a part of the signal that begins at input `start` and holds their whole
-    /// support.
-    pub(super) fn apply_range(
-        &self,
-        x: &[f64],
-        start: usize,
-        out: &mut [f64],
-        range: std::ops::Range<usize>,
-    ) {
-        let m = self.reach();
+    /// Inputs that the outputs of this range depend on, in order (wrapped, where the signal repeats).
+    pub fn inputs(&self, range: std::ops::Range<usize>) -> Vec<usize> {
+        if range.is_empty() {
+            return Vec::new();
+        }
+        let (n, m) = (self.count as isize, self.reach() as isize);
+        let (first, last) = (
+            self.at[range.start] as isize,
+            self.at[range.end - 1] as isize,
+        );
+        (first - m..=last + m)
+            .map(|i| i.rem_euclid(n) as usize)
+            .collect()
+    }
+
+    /// Outputs of a range from the part of the signal that [`Decimator::inputs`] names.
+    ///
+    /// # Panics
+    /// If the lengths do not fit.
+    pub fn apply_part(&self, x: &[f64], range: std::ops::Range<usize>, out: &mut [f64]) {
+        let Some(&first) = self.at.get(range.start) else {
+            return;
+        };
+        let length = self.kernel.len();
         for (y, &i) in out.iter_mut().zip(&self.at[range]) {
-            let centre = i - start;
-            *y = if centre >= m && centre + m < x.len() {
-                dot(&self.kernel, &x[centre - m..centre + m + 1])
-            } else {
-                // only where the signal repeats
-                let n = x.len();
-                let mut sum = self.taps[0] * x[centre];
-                for (k, w) in self.taps.iter().enumerate().skip(1) {
-                    let k = k % n;
-                    sum += w * (x[(centre + n - k) % n] + x[(centre + k) % n]);
-                }
-                sum
-            };
+            *y = dot(&self.kernel, &x[i - first..i - first + length]);
         }
     }
 

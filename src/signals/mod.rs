@@ -14,8 +14,9 @@
 //! ```
 //!
 //! with the spectrum `S_q` of the positions and its noise floor `S_n`, from the scatter of the periods
-//! or from the highest frequencies. The highest cut-off of all joints is that of the parallel filter
-//! ([`Decimator`]), which all columns of `W` and `τ` pass.
+//! or from the highest frequencies. The parallel filter ([`Decimator`]), which all columns of `W` and
+//! `τ` pass, has its cut-off at ten times the bandwidth of the motion ([`common_cutoff`]); the
+//! positions are cut off at 2.5 times that at most.
 //!
 //! Of a parallel robot the logged positions are those of its actuators; the coordinates are the pose of
 //! its platform, from forward kinematics sample by sample ([`platform`]).
@@ -29,6 +30,7 @@ mod prepare;
 
 pub use butterworth::Butterworth;
 pub use decimate::Decimator;
+pub use prepare::{averaged, common_cutoff};
 
 use crate::dynamics::Samples;
 use crate::error::Warning;

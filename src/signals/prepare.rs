@@ -12,6 +12,24 @@ use rayon::prelude::*;
 /// Continuation of the ends for the Butterworth filter, in periods of its cut-off.
 const PAD: f64 = 3.0;
 
+/// Cut-off of the parallel filter, in bandwidths of the motion.
+const BANDS: f64 = 10.0;
+/// Highest cut-off of the positions, in cut-offs of the parallel filter, which its pass band must not
+/// feel.
+const MARGIN: f64 = 2.5;
+
+/// Cut-off of the filter that torque and regressor pass, from the data: ten times the bandwidth of the
+/// motion, over all joints of all these records, so that they are all filtered alike. The rigid-body
+/// torque has twice the frequencies of the motion and friction its harmonics; what lies beyond is drive
+/// and structure.
+pub fn common_cutoff<'a>(records: impl IntoIterator<Item = &'a Record>) -> f64 {
+    records
+        .into_iter()
+        .flat_map(|r| r.q.iter().map(|q| cutoff::bandwidth(q, r.rate())))
+        .fold(0.0, f64::max)
+        * BANDS
+}
+
 /// Positions of the coordinates and their two derivatives.
 type Rates = [Vec<f64>; 3];
 
@@ -23,8 +41,13 @@ impl Prepared {
     /// samples.
     pub fn new(record: &Record, plant: &Plant, settings: &Settings) -> Result<Prepared> {
         check(settings, record)?;
+        let cutoff = settings.cutoff.unwrap_or_else(|| common_cutoff([record]));
+        let settings = &Settings {
+            cutoff: Some(cutoff),
+            ..settings.clone()
+        };
         match record.periods() {
-            Some((samples, count)) if settings.average && count >= 2 => {
+            Some((samples, count)) if settings.average && averaged(record).is_some() => {
                 Self::periodic(record, plant, settings, samples, count)
             }
             _ => Self::aperiodic(record, plant, settings),
@@ -45,9 +68,13 @@ impl Prepared {
                     let as_is = [q.clone(), dq[j].clone(), ddq[j].clone()];
                     return Ok((f64::INFINITY, as_is));
                 }
+                let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
                 let frequency = match settings.position_cutoff {
                     Some(f) => f,
-                    None => cutoff::aperiodic(q, rate).frequency,
+                    None => cutoff::aperiodic(q, rate)
+                        .frequency
+                        .min(most)
+                        .min(0.45 * rate),
                 };
                 let low = Butterworth::low_pass(settings.order, frequency.min(0.45 * rate), rate)?;
                 let pad = low.default_pad().max((PAD * rate / frequency) as usize);
@@ -73,7 +100,7 @@ impl Prepared {
             (Some(_), Some(_), _) => "measured velocities and accelerations, taken as they are",
             (_, _, Some(_)) => "as asked for",
             (Some(_), None, _) => "least estimated error of the acceleration (measured velocities)",
-            _ => "least estimated error of the acceleration",
+            _ => "least estimated error of the acceleration, at most 2.5 cut-offs of the torque",
         };
         let mut valid = record.valid.clone();
         let frequencies: Vec<f64> = series.iter().map(|s| s.0).collect();
@@ -152,7 +179,11 @@ impl Prepared {
                     Some(f) => ((f * period).floor().max(1.0) as usize, f),
                     None => {
                         let (k, c) = cutoff::periodic(&parts, period);
-                        (k, c.frequency)
+                        let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
+                        match c.frequency <= most {
+                            true => (k, c.frequency),
+                            false => ((most * period).ceil() as usize, most),
+                        }
                     }
                 };
                 (
@@ -206,6 +237,13 @@ impl Prepared {
     }
 }
 
+/// Whole periods of a record that is averaged: two or more, which make up at least nine tenths of it
+/// (what is left over would be lost).
+pub fn averaged(record: &Record) -> Option<usize> {
+    let (samples, count) = record.periods()?;
+    (count >= 2 && 10 * samples * count >= 9 * record.len()).then_some(count)
+}
+
 /// Whether the settings can be.
 fn check(settings: &Settings, record: &Record) -> Result<()> {
     let half = 0.5 * record.rate();
@@ -231,8 +269,7 @@ fn check(settings: &Settings, record: &Record) -> Result<()> {
 
 /// Chooses the common filter from the cut-offs of the positions.
 fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
-    let highest = p.position_cutoff.iter().cloned().fold(0.0, f64::max);
-    let cutoff = settings.cutoff.unwrap_or(highest);
+    let cutoff = settings.cutoff.unwrap_or(f64::INFINITY);
     let cyclic = p.periods.is_some();
     p.filter = Decimator::new(cutoff, p.rate, &p.valid, cyclic);
     if p.filter.outputs() < 4 {

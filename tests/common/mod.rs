@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::needless_range_loop)]
 
 pub mod parallel;
+pub mod parallel_toml;
 pub mod tripod;
 
 use excite::dynamics::Samples;

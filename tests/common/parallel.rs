@@ -12,11 +12,14 @@ use std::path::PathBuf;
 
 /// The full set of reference cases, where it is at hand.
 pub fn checks() -> Option<PathBuf> {
-    let folder = match std::env::var_os("EXCITE_CHECKS") {
-        Some(path) => PathBuf::from(path),
-        None => PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/checks"),
-    };
-    folder.is_dir().then_some(folder)
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let named = std::env::var_os("EXCITE_CHECKS").map(PathBuf::from);
+    let shared = std::env::var_os("EXCITE_SHARED").map(|p| PathBuf::from(p).join("checks"));
+    named
+        .into_iter()
+        .chain(shared)
+        .chain(["../shared/checks", "../../shared/checks"].map(|p| root.join(p)))
+        .find(|p| p.is_dir())
 }
 
 /// Model and cases of `sg`, `h4` or `delta`: the full set, or the few that come with the tests.

@@ -29,6 +29,15 @@ pub(super) struct WorkspaceEntry {
     angular_acceleration: Option<Spanned<f64>>,
 }
 
+/// `[margins]`: what a motion keeps away from.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MarginsEntry {
+    singularity: Option<Spanned<f64>>,
+    constraint: Option<Spanned<f64>>,
+    distance: Option<Spanned<f64>>,
+}
+
 /// The keys that every mechanism has, as written.
 #[derive(Clone, Copy)]
 pub(super) struct Head<'a> {
@@ -39,6 +48,7 @@ pub(super) struct Head<'a> {
     pub home: &'a Option<Spanned<Vec<f64>>>,
     pub length: &'a Option<Spanned<f64>>,
     pub workspace: &'a Option<WorkspaceEntry>,
+    pub margins: &'a Option<MarginsEntry>,
     pub actuator: &'a Option<JointEntry>,
     pub joint: &'a [Spanned<JointEntry>],
 }
@@ -59,6 +69,7 @@ macro_rules! mechanism_file {
             home: Option<toml::Spanned<Vec<f64>>>,
             length: Option<toml::Spanned<f64>>,
             workspace: Option<crate::mechanism::file::common::WorkspaceEntry>,
+            margins: Option<crate::mechanism::file::common::MarginsEntry>,
             actuator: Option<crate::robot::file::joint::JointEntry>,
             #[serde(default)]
             joint: Vec<toml::Spanned<crate::robot::file::joint::JointEntry>>,
@@ -80,6 +91,7 @@ macro_rules! mechanism_file {
                     home: &self.home,
                     length: &self.length,
                     workspace: &self.workspace,
+                    margins: &self.margins,
                     actuator: &self.actuator,
                     joint: &self.joint,
                 }
@@ -210,7 +222,7 @@ impl Head<'_> {
     }
 
     /// What `[actuator]` says of every actuator.
-    fn shared(&self, joint: &mut Joint, warnings: &mut Vec<Warning>) -> Result<()> {
+    pub(super) fn shared(&self, joint: &mut Joint, warnings: &mut Vec<Warning>) -> Result<()> {
         let Some(entry) = self.actuator else {
             return Ok(());
         };
@@ -237,10 +249,9 @@ impl Head<'_> {
             if let Some(j) = setup.robot.joints.iter_mut().find(|j| j.name == joint.name) {
                 j.position_resolution = joint.position_resolution;
                 j.gear_ratio = joint.gear_ratio;
-                for (term, wanted) in JointTerm::ALL.into_iter().zip(joint.identify) {
-                    // a term that the model has moved into a body (lumped inertia) is no column
-                    let moved = j.terms[term as usize] != joint.terms[term as usize];
-                    j.identify[term as usize] = wanted && !moved;
+                // what the model has moved into a body (lumped inertia) is no column any more
+                for (own, wanted) in j.identify.iter_mut().zip(joint.identify) {
+                    *own &= wanted;
                 }
             }
         }
@@ -280,7 +291,50 @@ impl Head<'_> {
         mechanism.robot.warnings.splice(0..0, warnings.clone());
         mechanism.warnings.splice(0..0, warnings);
         self.workspace(&mut mechanism)?;
+        self.margins(&mut mechanism)?;
         Ok(mechanism)
+    }
+
+    /// Reads `[margins]` into the mechanism.
+    fn margins(&self, mechanism: &mut Mechanism) -> Result<()> {
+        let Some(m) = self.margins else {
+            return Ok(());
+        };
+        let (source, what) = (self.source, "[margins]");
+        let margins = &mut mechanism.margins;
+        for (key, value, to) in [
+            ("singularity", &m.singularity, &mut margins.actuation),
+            ("constraint", &m.constraint, &mut margins.constraint),
+            ("distance", &m.distance, &mut margins.distance),
+        ] {
+            let Some(value) = value else { continue };
+            let number = *value.get_ref();
+            if !(number >= 0.0 && number.is_finite()) {
+                return Err(source.error(
+                    value.span().start,
+                    what,
+                    format!("{key} must be a number of at least 0, not {number}"),
+                ));
+            }
+            *to = number;
+        }
+        let pairs = mechanism.pairs();
+        let home = mechanism.home.clone();
+        if let Some(u) = mechanism
+            .pose_uses(&home, &pairs)
+            .into_iter()
+            .find(|u| u.used() > 1.0)
+        {
+            mechanism.warnings.push(Warning::new(
+                u.name.clone(),
+                format!(
+                    "at home already beyond its limit: {:.4} where {:.4} is allowed; no design \
+                     will be found",
+                    u.value, u.limit
+                ),
+            ));
+        }
+        Ok(())
     }
 
     /// Reads `[workspace]` into the mechanism.

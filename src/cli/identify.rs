@@ -1,0 +1,244 @@
+//! `excite identify EXPERIMENT`.
+
+use super::{pretty, print, warn, write};
+use excite::estimate::{Consistency, Identification, Method, Settings, identify, json, robot};
+use excite::log::Experiment;
+use excite::output::prepare_dir;
+use excite::report::after;
+use excite::robot::JointTerm;
+use excite::{Error, Plant, Result, Warning};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Identify the model from recorded runs.
+#[derive(clap::Args)]
+#[command(
+    long_about = "Identify the model from recorded runs: base parameters with honest uncertainty, and standard \
+                  parameters that a robot can have, validated on records that were not fitted.\n\nWrites \
+                  model.json, robot.urdf (identified inertia and friction), robot.xml (the same for MuJoCo), \
+                  robot.toml, report.json and report.html.",
+    after_help = "Examples:\n  excite identify experiment.toml\n  excite identify experiment.toml --output run1 \
+                  --method robust --cutoff 20\n  excite identify experiment.toml --identify none --prior 100"
+)]
+pub struct Args {
+    /// experiment.toml: the robot and its logs
+    experiment: PathBuf,
+    /// Directory for the results
+    #[arg(short, long, default_value = "out")]
+    output: PathBuf,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+    /// Estimator of the base parameters: ols, wls (full covariance between joints), robust (Huber,
+    /// Tukey), ml (maximum likelihood from the scatter of periods), iv (instrumental variables
+    /// from the commanded motion)
+    #[arg(long, value_name = "NAME", default_value = "wls", value_parser = ["ols", "wls", "robust", "ml", "iv"])]
+    method: String,
+    /// Physical consistency: entropic (distance from the nominal bodies by log-determinant), lmi
+    /// (semidefinite program, quadratic distance), free (none)
+    #[arg(long, value_name = "NAME", default_value = "entropic", value_parser = ["entropic", "lmi", "free"])]
+    consistency: String,
+    /// Strength of the prior: 4 for nominal values good to 50 %, 100 for 10 % [default: by
+    /// cross-validation]
+    #[arg(long, value_name = "STRENGTH")]
+    prior: Option<f64>,
+    /// Cut-off of the filter that torque and regressor pass, Hz [default: ten times the bandwidth
+    /// of the motion]
+    #[arg(long, value_name = "HZ")]
+    cutoff: Option<f64>,
+    /// Cut-off of the positions, Hz [default: from their spectrum]
+    #[arg(long, value_name = "HZ")]
+    position_cutoff: Option<f64>,
+    /// Do not average the periods of motion that repeats
+    #[arg(long)]
+    no_average: bool,
+    /// Derive velocities and accelerations from positions even where the log has them
+    #[arg(long)]
+    derive: bool,
+    /// Joint columns beside the ten of each link, for all joints: armature, viscous, coulomb,
+    /// offset, or none [default: as in the robot file; viscous, coulomb and offset where it lists
+    /// none for any joint]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    identify: Option<Vec<String>>,
+    /// Print report.json to standard output instead of a summary
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args) -> Result<()> {
+    let begin = Instant::now();
+    let files = [
+        "model.json",
+        "robot.urdf",
+        "robot.xml",
+        "robot.toml",
+        "report.json",
+        "report.html",
+    ];
+    let mut experiment = Experiment::read(&args.experiment)?;
+    let mut notes = Vec::new();
+    experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
+    let serial = experiment.plant.mechanism().is_none();
+    let wanted: Vec<&str> = files
+        .into_iter()
+        .filter(|f| serial || !matches!(*f, "robot.toml" | "robot.xml"))
+        .collect();
+    let mut settings = Settings {
+        method: match args.method.as_str() {
+            "ols" => Method::Ols,
+            "robust" => Method::Robust,
+            "ml" => Method::Ml,
+            "iv" => Method::Iv,
+            _ => Method::Wls,
+        },
+        consistency: match args.consistency.as_str() {
+            "lmi" => Consistency::Lmi,
+            "free" => Consistency::Free,
+            _ => Consistency::Entropic,
+        },
+        prior_strength: args.prior,
+        ..Settings::default()
+    };
+    settings.signals.cutoff = args.cutoff;
+    settings.signals.position_cutoff = args.position_cutoff;
+    settings.signals.average = !args.no_average;
+    settings.signals.measured_rates = !args.derive;
+    let paths = prepare_dir(&args.output, &wanted, args.force)?;
+    let path = |name: &str| {
+        wanted
+            .iter()
+            .position(|f| *f == name)
+            .map(|k| paths[k].clone())
+    };
+
+    let plant = &experiment.plant;
+    let mut id = identify(plant, &experiment.records, &settings)?;
+    id.warnings.splice(0..0, notes);
+    warn(&id.warnings);
+    let (_, verdict) = after::verdict(plant, &id);
+    let robot = robot::with_values(plant, &id.phi);
+    let report = json::report(
+        plant,
+        &id,
+        &settings,
+        &verdict,
+        begin.elapsed().as_secs_f64(),
+    );
+    let mut texts = vec![
+        ("model.json", pretty(&json::model(plant, &id))),
+        ("robot.urdf", robot::urdf(&robot)),
+        ("report.json", pretty(&report)),
+        ("report.html", after::html(plant, &id, &settings)),
+    ];
+    if serial {
+        texts.push(("robot.xml", robot::mujoco(&robot)));
+        texts.push(("robot.toml", robot.to_toml_template("robot.urdf")));
+    }
+    for (name, text) in &texts {
+        if let Some(p) = path(name) {
+            write(&p, args.force, text)?;
+        }
+    }
+    match args.json {
+        true => print(&pretty(&report)),
+        false => print(&summary(
+            &id,
+            &verdict,
+            &paths,
+            begin.elapsed().as_secs_f64(),
+        )),
+    }
+}
+
+/// The joint columns: those asked for, those of the file, or the usual ones where it lists none.
+fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> Result<Plant> {
+    let mut terms = Vec::new();
+    for name in asked
+        .unwrap_or_default()
+        .iter()
+        .filter(|n| n.as_str() != "none")
+    {
+        match JointTerm::ALL.into_iter().find(|t| t.name() == name) {
+            Some(t) => terms.push(t),
+            None => {
+                return Err(Error::Argument(format!(
+                    "--identify knows armature, viscous, coulomb, offset and none, not `{name}`"
+                )));
+            }
+        }
+    }
+    match plant {
+        Plant::Serial(robot) => {
+            let none = robot.joints.iter().all(|j| !j.identify.contains(&true));
+            if asked.is_none() && none {
+                notes.push(Warning::new(
+                    &robot.name,
+                    "its file lists no joint terms to identify; viscous and Coulomb friction and offset were \
+                     identified for every joint (--identify none leaves them out)",
+                ));
+                terms = vec![JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
+            } else if asked.is_none() {
+                return Ok(Plant::Serial(robot));
+            }
+            Ok(Plant::Serial(robot.with_terms(&terms)))
+        }
+        Plant::Parallel(_) if asked.is_some() => Err(Error::Argument(
+            "--identify is for serial robots; list the terms of a parallel one in its file".into(),
+        )),
+        other => Ok(other),
+    }
+}
+
+fn summary(id: &Identification, verdict: &str, files: &[PathBuf], seconds: f64) -> String {
+    let v = &id.validation;
+    let percent = |x: f64| format!("{:.2} %", 100.0 * x);
+    let mut out = String::new();
+    let mut width = 0;
+    for word in verdict.split(' ') {
+        if width + word.chars().count() > 79 {
+            out.push('\n');
+            width = 0;
+        }
+        out.push_str(word);
+        out.push(' ');
+        width += word.chars().count() + 1;
+    }
+    out.push('\n');
+    let pair = |name: &str, fit: f64, holdout: Option<f64>| {
+        format!(
+            "  {name:<28} fit {:>9}   holdout {:>9}\n",
+            percent(fit),
+            holdout.map_or("none".into(), percent)
+        )
+    };
+    out.push_str("torque error\n");
+    out += &pair("nominal", v.nominal.0, v.nominal.1);
+    out += &pair("least squares alone", v.plain.0, v.plain.1);
+    out += &pair("essential parameters alone", v.essential.0, v.essential.1);
+    out += &pair(
+        "this model",
+        v.fit.relative_error,
+        v.holdout.as_ref().map(|h| h.relative_error),
+    );
+    let _ = writeln!(
+        out,
+        "{} base parameters, {} essential; condition number {:.1}; prior strength {}",
+        id.base.count(),
+        id.essential.kept.len(),
+        id.condition,
+        id.prior_strength
+    );
+    if let Some(p) = id.prepared.first() {
+        let _ = writeln!(
+            out,
+            "filtered at {:.2} Hz, {:.1} equations a second and joint; done in {seconds:.2} s",
+            p.filter.cutoff,
+            p.output_rate()
+        );
+    }
+    for f in files {
+        let _ = writeln!(out, "wrote {}", f.display());
+    }
+    out
+}

@@ -1,0 +1,148 @@
+//! `excite load EXPERIMENT`.
+
+use super::{pretty, print, warn, write};
+use clap::ValueEnum;
+use excite::load::{self, Identified, Method, Parameters, Settings};
+use excite::log::Experiment;
+use excite::output::prepare_dir;
+use excite::{Error, Result};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// Identify the load that a robot carries.
+#[derive(clap::Args)]
+#[command(
+    long_about = "Identify the load that a robot carries: mass, centre of mass and inertia, from logs \
+                  of its drives.\n\nEXPERIMENT is an experiment.toml. Records with payload = \
+                  \"unknown\" carry the load, records with \"none\" are of the empty robot; without \
+                  the latter the nominal model is subtracted. Records with a known payload, { mass, \
+                  com, inertia }, tell the gains of the drives first. The motions need not be the \
+                  same.\n\nWrites load.json and report.html.",
+    after_help = "Examples:\n  excite load experiment.toml --output load\n  excite load \
+                  experiment.toml --parameters mass-com\n  excite load experiment.toml --method \
+                  two-step --json"
+)]
+pub struct Args {
+    /// experiment.toml
+    experiment: PathBuf,
+    /// Directory for load.json and report.html
+    #[arg(short, long, default_value = "out")]
+    output: PathBuf,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+    /// Unknowns: all ten parameters, or mass and centre of mass of a point mass
+    #[arg(long, value_enum, default_value = "full")]
+    parameters: What,
+    /// Estimate that load.json holds: all parameters at once, or the two steps of Schulte & Gerland
+    /// (platforms); the report shows both
+    #[arg(long, value_enum, default_value = "one-step")]
+    method: How,
+    /// Do not take weight from samples near standstill
+    #[arg(long)]
+    unweighted: bool,
+    /// Give the estimate as it is, also where no body has such an inertia
+    #[arg(long)]
+    unconstrained: bool,
+    /// Mean speed of the actuators at which samples begin to count in the two steps, rad/s or m/s
+    /// [default: a fifth of its root mean square]
+    #[arg(long, value_name = "SPEED")]
+    standstill: Option<f64>,
+    /// Cut-off of the positions before they are differentiated, Hz [default: from the data]
+    #[arg(long, value_name = "HZ")]
+    position_cutoff: Option<f64>,
+    /// Cut-off of the filter that torques and model pass, Hz; inf for none [default: from the data]
+    #[arg(long, value_name = "HZ")]
+    cutoff: Option<f64>,
+    /// Print load.json to standard output instead of a summary
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum What {
+    Full,
+    MassCom,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum How {
+    OneStep,
+    TwoStep,
+}
+
+pub fn run(args: Args) -> Result<()> {
+    for (name, value) in [
+        ("standstill", args.standstill),
+        ("position-cutoff", args.position_cutoff),
+        ("cutoff", args.cutoff),
+    ] {
+        if let Some(v) = value
+            && (v.is_nan() || v <= 0.0)
+        {
+            return Err(Error::Argument(format!(
+                "--{name} must be positive, not {v}"
+            )));
+        }
+    }
+    let mut settings = Settings {
+        parameters: match args.parameters {
+            What::Full => Parameters::Full,
+            What::MassCom => Parameters::MassCom,
+        },
+        method: match args.method {
+            How::OneStep => Method::OneStep,
+            How::TwoStep => Method::TwoStep,
+        },
+        weighted: !args.unweighted,
+        consistent: !args.unconstrained,
+        standstill: args.standstill,
+        ..Settings::default()
+    };
+    settings.signals.position_cutoff = args.position_cutoff;
+    settings.signals.cutoff = args.cutoff;
+    let experiment = Experiment::read(&args.experiment)?;
+    let files = prepare_dir(&args.output, &["load.json", "report.html"], args.force)?;
+    let found = load::identify(&experiment, &settings)?;
+    warn(&found.warnings);
+    let json = load::report::json(&found);
+    write(&files[0], args.force, &pretty(&json))?;
+    write(&files[1], args.force, &load::report::html(&found))?;
+    match args.json {
+        true => print(&pretty(&json)),
+        false => print(&summary(&found, &files)),
+    }
+}
+
+fn summary(found: &Identified, files: &[PathBuf]) -> String {
+    let mut out = String::new();
+    let mut line = |name: &str, body: &load::LoadBody| {
+        let (v, s) = (body.values(), body.stds());
+        let _ = writeln!(out, "{name}: mass {:.4} ± {:.4} kg", v[0], s[0]);
+        let _ = writeln!(
+            out,
+            "  centre of mass ({:.2}, {:.2}, {:.2}) ± ({:.2}, {:.2}, {:.2}) mm",
+            1e3 * v[1],
+            1e3 * v[2],
+            1e3 * v[3],
+            1e3 * s[1],
+            1e3 * s[2],
+            1e3 * s[3]
+        );
+        if body.known.iter().all(|k| *k) {
+            let _ = writeln!(
+                out,
+                "  inertia about it: xx {:.4}, xy {:.4}, xz {:.4}, yy {:.4}, yz {:.4}, zz {:.4} kg m²",
+                v[4], v[5], v[6], v[7], v[8], v[9]
+            );
+        }
+    };
+    line(&format!("{}, one step", found.frame), &found.one_step.load);
+    if let Some(two) = &found.two_step {
+        line(&format!("{}, two steps", found.frame), &two.load);
+    }
+    for f in files {
+        let _ = writeln!(out, "wrote {}", f.display());
+    }
+    out
+}

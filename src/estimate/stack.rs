@@ -1,0 +1,174 @@
+//! The filtered equations of a record: `W_b π = τ`, built in blocks of time.
+
+use crate::base::BaseParameters;
+use crate::dynamics::Samples;
+use crate::error::Result;
+use crate::log::Purpose;
+use crate::plant::Plant;
+use crate::signals::Prepared;
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+
+/// Equations of one record, actuator-major: row `a·count + k`.
+#[derive(Debug, Clone)]
+pub struct Stack {
+    /// name of the record
+    pub name: String,
+    /// what it is for
+    pub purpose: Purpose,
+    /// actuators
+    pub actuators: usize,
+    /// samples after filtering and decimation
+    pub count: usize,
+    /// their rate, Hz
+    pub rate: f64,
+    /// samples as recorded that one of them stands for
+    pub stands_for: f64,
+    /// times of the samples, s
+    pub time: Vec<f64>,
+    /// columns kept as base parameters, filtered
+    pub w: Mat<f64>,
+    /// measured torque, filtered
+    pub measured: Vec<f64>,
+    /// the known part of the torque, filtered
+    pub known: Vec<f64>,
+}
+
+/// Samples of the motion that a thread works on at least.
+const BLOCK: usize = 4096;
+
+/// A block of outputs: their columns one after the other, and the known torque.
+struct Part {
+    w: Vec<f64>,
+    known: Vec<f64>,
+}
+
+impl Stack {
+    /// The equations of a prepared record. The regressor is never held at full rate for more than a
+    /// few thousand samples.
+    ///
+    /// # Errors
+    /// A pose of a parallel robot that cannot be reached.
+    pub fn new(plant: &Plant, base: &BaseParameters, p: &Prepared) -> Result<Stack> {
+        Self::with_motion(plant, base, p, &p.motion)
+    }
+
+    /// The same with another motion of the same samples in the place of the measured one, as
+    /// instruments need it.
+    ///
+    /// # Errors
+    /// As [`Stack::new`].
+    pub fn with_motion(
+        plant: &Plant,
+        base: &BaseParameters,
+        p: &Prepared,
+        motion: &Samples,
+    ) -> Result<Stack> {
+        let (n, m, b) = (p.actuators, p.outputs(), base.count());
+        let reach = p.filter.reach();
+        let each = (BLOCK.max(4 * reach) / p.filter.factor).max(16);
+        let ranges: Vec<_> = (0..m)
+            .step_by(each)
+            .map(|from| from..(from + each).min(m))
+            .collect();
+        let parts: Vec<Part> = ranges
+            .par_iter()
+            .map(|range| {
+                let inputs = p.filter.inputs(range.clone());
+                let part = select(motion, &inputs);
+                let w = plant.regressor(&part)?;
+                let known = plant.known_torque(&part)?;
+                let outputs = range.len();
+                let mut out = Part {
+                    w: vec![0.0; b * n * outputs],
+                    known: vec![0.0; n * outputs],
+                };
+                let count = inputs.len();
+                for (c, to) in out.w.chunks_exact_mut(n * outputs).enumerate() {
+                    let column = column(w.as_ref(), base.kept[c]);
+                    for a in 0..n {
+                        let from = &column[a * count..(a + 1) * count];
+                        if from.iter().any(|x| *x != 0.0) {
+                            let to = &mut to[a * outputs..(a + 1) * outputs];
+                            p.filter.apply_part(from, range.clone(), to);
+                        }
+                    }
+                }
+                for a in 0..n {
+                    let from = &known[a * count..(a + 1) * count];
+                    let to = &mut out.known[a * outputs..(a + 1) * outputs];
+                    p.filter.apply_part(from, range.clone(), to);
+                }
+                Ok(out)
+            })
+            .collect::<Result<_>>()?;
+        let mut w = Mat::zeros(n * m, b);
+        let mut known = vec![0.0; n * m];
+        for (range, part) in ranges.iter().zip(&parts) {
+            let outputs = range.len();
+            for a in 0..n {
+                let to = a * m + range.start;
+                let from = a * outputs;
+                known[to..to + outputs].copy_from_slice(&part.known[from..from + outputs]);
+                for c in 0..b {
+                    let from = c * n * outputs + a * outputs;
+                    for k in 0..outputs {
+                        w[(to + k, c)] = part.w[from + k];
+                    }
+                }
+            }
+        }
+        let averaged = p.periods.as_ref().map_or(1.0, |x| x.count as f64);
+        Ok(Stack {
+            name: p.name.clone(),
+            purpose: p.purpose,
+            actuators: n,
+            count: m,
+            rate: p.output_rate(),
+            stands_for: p.filter.factor as f64 * averaged,
+            time: p.output_times(),
+            w,
+            measured: p.filtered(&p.torque),
+            known,
+        })
+    }
+
+    /// Measured torque less the known part: the right-hand side.
+    pub fn tau(&self) -> Vec<f64> {
+        let pairs = self.measured.iter().zip(&self.known);
+        pairs.map(|(m, k)| m - k).collect()
+    }
+
+    /// Torque that base parameters predict, the known part included.
+    pub fn predicted(&self, pi: &[f64]) -> Vec<f64> {
+        let y = &self.w * faer::ColRef::from_slice(pi);
+        (0..y.nrows()).map(|i| y[i] + self.known[i]).collect()
+    }
+
+    /// Measured less predicted torque.
+    pub fn residual(&self, pi: &[f64]) -> Vec<f64> {
+        let predicted = self.predicted(pi);
+        let pairs = self.measured.iter().zip(predicted);
+        pairs.map(|(m, p)| m - p).collect()
+    }
+}
+
+fn column(w: MatRef<'_, f64>, c: usize) -> Vec<f64> {
+    (0..w.nrows()).map(|i| w[(i, c)]).collect()
+}
+
+/// The samples of these numbers.
+fn select(motion: &Samples, at: &[usize]) -> Samples {
+    let rows = |x: &[f64]| -> Vec<f64> {
+        x.chunks_exact(motion.count)
+            .flat_map(|row| at.iter().map(move |&i| row[i]))
+            .collect()
+    };
+    Samples {
+        dof: motion.dof,
+        count: at.len(),
+        q: rows(&motion.q),
+        qd: rows(&motion.qd),
+        qdd: rows(&motion.qdd),
+    }
+}

@@ -1,0 +1,223 @@
+//! The linear system of all records: torques that the nominal model does not explain, and the
+//! columns that may.
+
+use super::Loaded;
+use crate::base::BaseParameters;
+use crate::dynamics::{Samples, Tree, Workspace};
+use crate::error::Result;
+use crate::log::Payload;
+use crate::plant::Plant;
+use crate::regressor::{Regressor, term_factor};
+use crate::robot::{Column, JointTerm};
+use faer::Mat;
+
+/// Friction columns of an actuator in one record: Coulomb, viscous, offset.
+pub const FRICTION: [JointTerm; 3] = [JointTerm::Coulomb, JointTerm::Viscous, JointTerm::Offset];
+
+/// One record as rows of the system; all lists actuator-major over the filtered samples.
+#[derive(Debug)]
+pub struct Part {
+    /// name of the record
+    pub name: String,
+    /// whether it has the unknown load
+    pub loaded: bool,
+    /// filtered samples
+    pub count: usize,
+    /// their times, s
+    pub time: Vec<f64>,
+    /// motion of the coordinates at them
+    pub motion: Samples,
+    /// velocities of the actuators at them
+    pub speed: Vec<f64>,
+    /// measured torque
+    pub torque: Vec<f64>,
+    /// measured torque minus nominal model without friction of the actuators
+    pub y: Vec<f64>,
+    /// the same of every period, where there are periods
+    pub periods: Vec<Vec<f64>>,
+    /// ten columns of the body that carries the load
+    pub tool: Mat<f64>,
+    /// columns of the deviations of the empty robot
+    pub deviation: Mat<f64>,
+    /// friction factors of each actuator, `FRICTION` order
+    pub friction: [Vec<f64>; 3],
+}
+
+/// All records.
+#[derive(Debug)]
+pub struct System {
+    /// actuators
+    pub actuators: usize,
+    /// records
+    pub parts: Vec<Part>,
+    /// base parameters of the load's ten columns
+    pub base: BaseParameters,
+    /// names of the deviations
+    pub deviations: Vec<String>,
+}
+
+/// Regressor columns of the tool for a motion, `actuators·count × 10`.
+pub fn tool_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<Mat<f64>> {
+    let count = x.count;
+    match plant {
+        Plant::Serial(robot) => {
+            let w = Regressor::new(robot, x);
+            let w = w.mat();
+            Ok(Mat::from_fn(w.nrows(), 10, |r, k| w[(r, 10 * tool + k)]))
+        }
+        Plant::Parallel(mechanism) => {
+            let motion = mechanism.motion(x)?;
+            let na = mechanism.actuators();
+            let rows = na * count;
+            let mut w = vec![0.0; rows * 10];
+            let tree: &Tree = mechanism.tree();
+            tree.projected_regressor(
+                &mut Workspace::default(),
+                &[tool],
+                &motion.tree,
+                &motion.g,
+                na,
+                &mut w,
+                rows,
+                count,
+            );
+            Ok(Mat::from_fn(rows, 10, |r, k| w[k * rows + r]))
+        }
+    }
+}
+
+/// Columns of what may deviate in the empty robot: all bodies and armatures of a serial robot, the
+/// platform of a parallel one.
+fn deviation_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<(Mat<f64>, Vec<String>)> {
+    match plant {
+        Plant::Serial(robot) => {
+            let columns = robot.columns();
+            let wanted: Vec<usize> = (0..columns.len())
+                .filter(|&c| match columns[c] {
+                    Column::Inertial { .. } => true,
+                    Column::Term { term, .. } => term == JointTerm::Armature,
+                })
+                .collect();
+            let names = wanted
+                .iter()
+                .map(|&c| robot.column_name(columns[c]))
+                .collect();
+            let w = Regressor::new(robot, x);
+            let w = w.mat();
+            Ok((
+                Mat::from_fn(w.nrows(), wanted.len(), |r, c| w[(r, wanted[c])]),
+                names,
+            ))
+        }
+        Plant::Parallel(_) => {
+            let names = crate::robot::inertia::NAMES.map(|n| format!("platform.{n}"));
+            Ok((tool_columns(plant, tool, x)?, names.to_vec()))
+        }
+    }
+}
+
+/// Nominal torque without viscous, Coulomb and constant terms of the actuators.
+fn rigid_torque(plant: &Plant, x: &Samples, moved: &Samples) -> Result<Vec<f64>> {
+    let mut tau = plant.nominal_torque(x)?;
+    for (a, joint) in plant.actuators().iter().enumerate() {
+        for term in FRICTION {
+            let value = joint.terms[term as usize];
+            if value != 0.0 {
+                for s in 0..x.count {
+                    tau[a * x.count + s] -= value * term_factor(term, moved.at(a, s));
+                }
+            }
+        }
+    }
+    Ok(tau)
+}
+
+impl System {
+    /// Assembles the records without a known load; `deviate` for columns of the deviations.
+    ///
+    /// # Errors
+    /// Motions that the plant cannot take.
+    pub fn new(plant: &Plant, tool: usize, records: &[&Loaded], deviate: bool) -> Result<Self> {
+        let states = plant.random_states(400, 0x10ad);
+        let names = crate::robot::inertia::NAMES.map(|n| format!("load.{n}"));
+        let over = tool_columns(plant, tool, &states)?;
+        let base = BaseParameters::from_matrix(names.to_vec(), units(), over.as_ref())?;
+        let (kept, deviations) = match deviate {
+            false => (Vec::new(), Vec::new()),
+            true => {
+                let (w, names) = deviation_columns(plant, tool, &states)?;
+                let none = vec![""; names.len()];
+                let b = BaseParameters::from_matrix(names.clone(), none, w.as_ref())?;
+                let kept_names = b.kept.iter().map(|&k| names[k].clone()).collect();
+                (b.kept, kept_names)
+            }
+        };
+        let parts = records
+            .iter()
+            .map(|r| part(plant, tool, r, &kept))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(System {
+            actuators: plant.actuated().len(),
+            parts,
+            base,
+            deviations,
+        })
+    }
+}
+
+fn units() -> Vec<&'static str> {
+    crate::robot::inertia::UNITS.to_vec()
+}
+
+fn part(plant: &Plant, tool: usize, loaded: &Loaded, kept: &[usize]) -> Result<Part> {
+    let record = &loaded.record;
+    let x = &record.motion;
+    let (n, count, na) = (record.count(), record.outputs(), record.actuators);
+    let moved = plant.actuator_motion(x)?;
+    let filter = |w: &Mat<f64>| {
+        let columns: Vec<Vec<f64>> = (0..w.ncols())
+            .map(|c| record.filtered(w.col_as_slice(c)))
+            .collect();
+        Mat::from_fn(na * count, w.ncols(), |r, c| columns[c][r])
+    };
+    let tool_full = tool_columns(plant, tool, x)?;
+    let deviation = match kept.is_empty() {
+        true => Mat::zeros(na * count, 0),
+        false => {
+            let (w, _) = deviation_columns(plant, tool, x)?;
+            filter(&Mat::from_fn(na * n, kept.len(), |r, c| w[(r, kept[c])]))
+        }
+    };
+    let rigid = record.filtered(&rigid_torque(plant, x, &moved)?);
+    let explain = |torque: &[f64]| -> Vec<f64> {
+        let y = record.filtered(torque);
+        y.iter().zip(&rigid).map(|(a, b)| a - b).collect()
+    };
+    let friction = FRICTION.map(|term| {
+        let raw: Vec<f64> = (0..na * n)
+            .map(|i| term_factor(term, moved.at(i / n, i % n)))
+            .collect();
+        record.filtered(&raw)
+    });
+    let speed = (0..na)
+        .flat_map(|a| record.filter.at().iter().map(move |&i| (a, i)))
+        .map(|(a, i)| moved.qd[a * n + i])
+        .collect();
+    Ok(Part {
+        name: record.name.clone(),
+        loaded: loaded.payload == Payload::Unknown,
+        count,
+        time: record.output_times(),
+        motion: record.output_motion(),
+        speed,
+        torque: record.filtered(&record.torque),
+        y: explain(&record.torque),
+        periods: match &record.periods {
+            Some(p) => p.torque.iter().map(|t| explain(t)).collect(),
+            None => Vec::new(),
+        },
+        tool: filter(&tool_full),
+        deviation,
+        friction,
+    })
+}

@@ -1,0 +1,414 @@
+//! The published two-step estimator for platforms: Schulte & Gerland, *A systematic load
+//! identification procedure for parallel robot manipulators*.
+//!
+//! With `F, M` the force and the moment about the platform's origin `P` that the legs exert on the
+//! platform (the inertia of the legs subtracted), `A` the orientation of the platform and
+//! `Ω = ω̃ω̃ + ω̇̃` in platform axes, Newton's equation `m (a_P + A Ω r) = F + m g` gives step 1,
+//! Euler's about the centre of mass step 2:
+//!
+//! ```text
+//! y₁ = a_P − g              Φ₁ = [ F | −A Ω ]           θ₁ = [1/m, r]
+//! y₂ = Aᵀ M − r × Aᵀ F      Φ₂ = L(ω̇) + ω̃ L(ω)          θ₂ = [Jxx, Jxy, Jxz, Jyy, Jyz, Jzz]
+//! ```
+//!
+//! The printed equations (3) and (4) have the signs of a `z` axis that points down and of the force
+//! of the platform on the legs; these hold for `z` up and the force on the platform. Both steps are
+//! weighted by a function of the mean piston speed `v̄ = mean_j |v_j|` that vanishes at standstill,
+//! `w = 1 − exp(−(v̄/v₀)⁴)` (the paper does not print its own), after Coulomb and viscous friction
+//! were taken off the forces.
+//!
+//! **What is known of its errors.** The first column of `Φ₁` holds the measured force, so its noise
+//! makes `1/m` too small: `m̂/m − 1 ≈ tr(Cov F) / mean |F|²`. Step 1 does not use the moments, which
+//! carry the centre of mass; and an error of `r` goes into `J`. Therefore [`one_step`](super::one_step)
+//! is the default.
+
+use super::body::{LoadBody, Quantities, difference, from_quantities};
+use super::one_step::{Solver, rms};
+use super::system::System;
+use super::{Loaded, Settings};
+use crate::dynamics::{Samples, Workspace};
+use crate::error::{Error, Result};
+use crate::log::Payload;
+use crate::mechanism::task::rates_to_omega;
+use crate::mechanism::{Mechanism, Task};
+use crate::plant::Plant;
+use crate::robot::Inertia;
+use crate::robot::inertia::skew;
+use faer::Mat;
+use faer::linalg::solvers::{DenseSolveCore, SolveLstsq};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+
+/// Motion of a platform and the force on it, in one sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlatformSample {
+    /// `A`: turns platform axes into base axes
+    pub rotation: Matrix3<f64>,
+    /// `ω`, platform axes, rad/s
+    pub omega: Vector3<f64>,
+    /// `ω̇`, platform axes, rad/s²
+    pub alpha: Vector3<f64>,
+    /// `a_P`, base axes, without gravity, m/s²
+    pub acceleration: Vector3<f64>,
+    /// `F`, base axes, N
+    pub force: Vector3<f64>,
+    /// `M` about `P`, base axes, N m
+    pub moment: Vector3<f64>,
+    /// weight
+    pub weight: f64,
+}
+
+impl PlatformSample {
+    /// `Φ₁` and `y₁`: Newton's equation, linear in `[1/m, r]`; base axes, m/s².
+    pub fn newton(&self, gravity: &Vector3<f64>) -> (SMatrix<f64, 3, 4>, Vector3<f64>) {
+        let turning = skew(&self.omega) * skew(&self.omega) + skew(&self.alpha);
+        let mut left = SMatrix::<f64, 3, 4>::zeros();
+        left.set_column(0, &self.force);
+        left.fixed_columns_mut::<3>(1)
+            .copy_from(&(-self.rotation * turning));
+        (left, self.acceleration - gravity)
+    }
+
+    /// `Φ₂` and `y₂`: Euler's equation about the centre of mass `r`, linear in the tensor; platform
+    /// axes, N m.
+    pub fn euler(&self, r: &Vector3<f64>) -> (SMatrix<f64, 3, 6>, Vector3<f64>) {
+        let back = self.rotation.transpose();
+        let right = back * self.moment - r.cross(&(back * self.force));
+        let left = spread(&self.alpha) + skew(&self.omega) * spread(&self.omega);
+        (left, right)
+    }
+}
+
+/// Result of the two steps for everything that moves with the platform.
+#[derive(Debug, Clone)]
+pub struct Total {
+    /// mass, centre of mass, tensor about the centre of mass
+    pub values: Quantities,
+    /// covariance of `[1/m, r]`
+    pub first: Mat<f64>,
+    /// covariance of the tensor
+    pub second: Mat<f64>,
+    /// root mean square of the residuals: m/s² and N m
+    pub residuals: [f64; 2],
+}
+
+/// `L(ω)`: `I ω = L(ω) [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`.
+fn spread(w: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
+    let (x, y, z) = (w.x, w.y, w.z);
+    SMatrix::<f64, 3, 6>::from_row_slice(&[
+        x, y, z, 0.0, 0.0, 0.0, //
+        0.0, x, 0.0, y, z, 0.0, //
+        0.0, 0.0, x, 0.0, y, z,
+    ])
+}
+
+/// Weighted least squares; the solution, its covariance and the root mean square of the residual.
+fn solve(a: Mat<f64>, y: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>, f64)> {
+    let n = a.ncols();
+    let qr = a.qr();
+    let x = qr.solve_lstsq(&y);
+    let x: Vec<f64> = (0..n).map(|c| x[(c, 0)]).collect();
+    if x.iter().any(|v| !v.is_finite()) {
+        return Err(Error::Infeasible(
+            "the two-step estimator has no solution: the platform does not turn about all axes"
+                .into(),
+        ));
+    }
+    let mut square = 0.0;
+    for r in 0..a.nrows() {
+        let fit: f64 = (0..n).map(|c| a[(r, c)] * x[c]).sum();
+        square += (y[(r, 0)] - fit).powi(2);
+    }
+    let variance = square / (a.nrows() - n).max(1) as f64;
+    let r = qr.thin_R();
+    let information = r.transpose() * r;
+    let inverse = information.partial_piv_lu().inverse();
+    let covariance = Mat::from_fn(n, n, |i, j| variance * inverse[(i, j)]);
+    Ok((x, covariance, (square / a.nrows() as f64).sqrt()))
+}
+
+/// Both steps; `gravity` in base axes, m/s².
+///
+/// # Errors
+/// Fewer than ten samples, or a motion that does not determine the parameters.
+pub fn total(samples: &[PlatformSample], gravity: &Vector3<f64>) -> Result<Total> {
+    let n = samples.len();
+    if n < 10 {
+        return Err(Error::Infeasible(format!(
+            "{n} samples are too few for the two-step estimator"
+        )));
+    }
+    let mut a = Mat::<f64>::zeros(3 * n, 4);
+    let mut y = Mat::<f64>::zeros(3 * n, 1);
+    for (i, s) in samples.iter().enumerate() {
+        let w = s.weight.sqrt();
+        let (left, right) = s.newton(gravity);
+        for k in 0..3 {
+            for c in 0..4 {
+                a[(3 * i + k, c)] = w * left[(k, c)];
+            }
+            y[(3 * i + k, 0)] = w * right[k];
+        }
+    }
+    let (first, cov1, rms1) = solve(a, y)?;
+    if first[0] <= 0.0 {
+        return Err(Error::Infeasible(format!(
+            "step 1 gives a mass of 1/{:.3e} kg: the forces are not those of legs that carry the \
+             platform (check the signs of forces or pressures)",
+            first[0]
+        )));
+    }
+    let r = Vector3::new(first[1], first[2], first[3]);
+    let mut a = Mat::<f64>::zeros(3 * n, 6);
+    let mut y = Mat::<f64>::zeros(3 * n, 1);
+    for (i, s) in samples.iter().enumerate() {
+        let w = s.weight.sqrt();
+        let (left, right) = s.euler(&r);
+        for k in 0..3 {
+            for c in 0..6 {
+                a[(3 * i + k, c)] = w * left[(k, c)];
+            }
+            y[(3 * i + k, 0)] = w * right[k];
+        }
+    }
+    let (j, cov2, rms2) = solve(a, y)?;
+    let mut values = [0.0; 10];
+    values[0] = 1.0 / first[0];
+    values[1..4].copy_from_slice(&first[1..]);
+    values[4..].copy_from_slice(&j);
+    Ok(Total {
+        values,
+        first: cov1,
+        second: cov2,
+        residuals: [rms1, rms2],
+    })
+}
+
+/// Result of [`estimate`].
+#[derive(Debug, Clone)]
+pub struct TwoStep {
+    /// the load: total minus platform
+    pub load: LoadBody,
+    /// everything that moves with the platform
+    pub total: Total,
+    /// what was subtracted: the platform as estimated from unloaded records, or nominal
+    pub platform: Inertia,
+    /// mean piston speed at which the weight is `1 − 1/e`, m/s
+    pub standstill: f64,
+    /// predicted bias of the total mass of the `1/m` form, as a fraction
+    pub bias: f64,
+}
+
+/// Estimates the load of the records with an unknown one.
+///
+/// # Errors
+/// A robot without a platform that moves in all six directions; otherwise as [`total`].
+pub fn estimate(
+    plant: &Plant,
+    tool: usize,
+    records: &[Loaded],
+    settings: &Settings,
+) -> Result<TwoStep> {
+    let mechanism = match plant.mechanism() {
+        Some(m) if m.task == Task::Pose && m.actuators() == 6 => m,
+        _ => {
+            return Err(Error::Infeasible(
+                "the two-step estimator is for platforms with six freedoms and six actuators; \
+                 the one-step fit serves all robots"
+                    .into(),
+            ));
+        }
+    };
+    let gravity = mechanism.robot.gravity;
+    let (mut full, mut empty) = (Vec::new(), Vec::new());
+    let mut standstill = 0.0;
+    for loaded in records {
+        let to = match loaded.payload {
+            Payload::Unknown => &mut full,
+            Payload::None => &mut empty,
+            Payload::Known { .. } => continue,
+        };
+        let (samples, v0) = platform_samples(plant, mechanism, tool, loaded, settings)?;
+        standstill = v0;
+        to.extend(samples);
+    }
+    let all = total(&full, &gravity)?;
+    let (platform, empty_covariance) = match empty.is_empty() {
+        true => (mechanism.robot.bodies[tool].inertia, None),
+        false => {
+            let t = total(&empty, &gravity)?;
+            (from_quantities(&t.values), Some(covariance(&t)))
+        }
+    };
+    let inertia = difference(&from_quantities(&all.values), &platform);
+    let mut c = covariance(&all);
+    if let Some(other) = empty_covariance {
+        c += other;
+    }
+    let load = LoadBody::new(inertia, c, [true; 10], settings.consistent)?;
+    let mean = full.iter().map(|s| s.force.norm_squared()).sum::<f64>() / full.len() as f64;
+    // residual of Newton's equation, as a force
+    let scatter = 3.0 * (all.residuals[0] * all.values[0]).powi(2);
+    Ok(TwoStep {
+        load,
+        platform,
+        standstill,
+        bias: scatter / mean,
+        total: all,
+    })
+}
+
+/// Covariance of the ten parameters about `P`, to first order from those of the two steps.
+fn covariance(t: &Total) -> Mat<f64> {
+    let at = |v: &[f64; 10]| -> [f64; 10] {
+        let mut q = *v;
+        q[0] = 1.0 / v[0];
+        from_quantities(&q).0
+    };
+    let mut centre = t.values;
+    centre[0] = 1.0 / t.values[0];
+    let columns: Vec<[f64; 10]> = (0..10)
+        .map(|k| {
+            let h = 1e-6 * centre[k].abs().max(1e-3);
+            let step = |s: f64| {
+                let mut v = centre;
+                v[k] += s * h;
+                at(&v)
+            };
+            let (up, down) = (step(1.0), step(-1.0));
+            std::array::from_fn(|i| (up[i] - down[i]) / (2.0 * h))
+        })
+        .collect();
+    let inner = |a: usize, b: usize| match (a < 4, b < 4) {
+        (true, true) => t.first[(a, b)],
+        (false, false) => t.second[(a - 4, b - 4)],
+        _ => 0.0,
+    };
+    Mat::from_fn(10, 10, |i, j| {
+        let mut sum = 0.0;
+        for a in 0..10 {
+            for b in 0..10 {
+                sum += columns[a][i] * inner(a, b) * columns[b][j];
+            }
+        }
+        sum
+    })
+}
+
+/// Motion of the platform and the wrench on it, friction and legs taken off, with the weights.
+fn platform_samples(
+    plant: &Plant,
+    mechanism: &Mechanism,
+    tool: usize,
+    loaded: &Loaded,
+    settings: &Settings,
+) -> Result<(Vec<PlatformSample>, f64)> {
+    // friction: Coulomb and viscous beside all that the platform may carry, unweighted
+    let as_loaded = Loaded {
+        record: loaded.record.clone(),
+        payload: Payload::Unknown,
+    };
+    let system = System::new(plant, tool, &[&as_loaded], false)?;
+    let solver = Solver::new(&system, system.base.kept.clone());
+    let solution = solver.solve(&|_, _| 1.0)?;
+    let part = &system.parts[0];
+    let (n, na) = (part.count, system.actuators);
+    let mut force = part.torque.clone();
+    for a in 0..na {
+        let f = solver.friction_of(&solution, 0, a);
+        for i in a * n..(a + 1) * n {
+            for k in 0..3 {
+                force[i] -= f[k] * part.friction[k][i];
+            }
+        }
+    }
+    let speeds: Vec<f64> = (0..n)
+        .map(|i| (0..na).map(|a| part.speed[a * n + i].abs()).sum::<f64>() / na as f64)
+        .collect();
+    let v0 = settings.standstill.unwrap_or(0.2 * rms(&speeds));
+    let weights: Vec<f64> = speeds
+        .iter()
+        .map(|v| match settings.weighted && v0 > 0.0 {
+            true => 1.0 - (-(v / v0).powi(4)).exp(),
+            false => 1.0,
+        })
+        .collect();
+    Ok((
+        wrenches(mechanism, tool, &part.motion, &force, &weights)?,
+        v0,
+    ))
+}
+
+/// Wrench on the platform from forces of the actuators (actuator-major, friction taken off): `Jᵀ f`
+/// minus what moves the legs.
+///
+/// # Errors
+/// Poses that the mechanism cannot take.
+pub fn wrenches(
+    mechanism: &Mechanism,
+    tool: usize,
+    x: &Samples,
+    force: &[f64],
+    weights: &[f64],
+) -> Result<Vec<PlatformSample>> {
+    let motion = mechanism.motion(x)?;
+    let (joints, n, m) = (motion.tree.dof, x.count, x.dof);
+    let mut phi: Vec<f64> = mechanism
+        .robot
+        .bodies
+        .iter()
+        .flat_map(|b| b.inertia.0)
+        .collect();
+    phi[10 * tool..10 * tool + 10].fill(0.0);
+    let mut gamma = vec![0.0; joints * n];
+    let ws = &mut Workspace::default();
+    mechanism
+        .tree()
+        .inverse_dynamics(ws, &phi, &motion.tree, &mut gamma);
+    for (j, joint) in mechanism.robot.joints.iter().enumerate() {
+        let own = mechanism.actuated.contains(&j);
+        for i in 0..n {
+            let [_, qd, qdd] = motion.tree.at(j, i);
+            let sign = if qd == 0.0 { 0.0 } else { qd.signum() };
+            let [armature, viscous, coulomb, offset] = joint.terms;
+            gamma[j * n + i] += armature * qdd;
+            if !own {
+                gamma[j * n + i] += viscous * qd + coulomb * sign + offset;
+            }
+        }
+    }
+    for (a, &j) in mechanism.actuated.iter().enumerate() {
+        for i in 0..n {
+            gamma[j * n + i] -= force[a * n + i];
+        }
+    }
+    (0..n)
+        .map(|i| {
+            let d = DMatrix::from_fn(joints, m, |j, k| motion.d[(j * m + k) * n + i]);
+            let g = DVector::from_fn(joints, |j, _| gamma[j * n + i]);
+            let q = -d.tr_mul(&g);
+            let column = |a: &[f64]| -> Vec<f64> { (0..m).map(|k| a[k * n + i]).collect() };
+            let pose = column(&x.q);
+            let angles = Vector3::new(pose[3], pose[4], pose[5]);
+            let Some(p) = mechanism
+                .task
+                .motion(&pose, &column(&x.qd), &column(&x.qdd))
+            else {
+                return Err(Error::Infeasible("the mechanism has no platform".into()));
+            };
+            // power: Fᵀ v + Mᵀ E ṙ
+            let Some(inverse) = rates_to_omega(&angles).transpose().try_inverse() else {
+                return Err(Error::Infeasible("the pitch is a right angle".into()));
+            };
+            let back = p.rotation.transpose();
+            Ok(PlatformSample {
+                rotation: p.rotation,
+                omega: back * p.omega,
+                alpha: back * p.alpha,
+                acceleration: p.acceleration,
+                force: Vector3::new(q[0], q[1], q[2]),
+                moment: inverse * Vector3::new(q[3], q[4], q[5]),
+                weight: weights.get(i).copied().unwrap_or(1.0),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,217 @@
+//! What the sensors make of a run, and the log that is written.
+
+use super::{Effects, Run};
+use crate::error::{Error, Result, Warning};
+use crate::output::write_atomic;
+use crate::plant::Plant;
+use nalgebra::{Rotation3, UnitQuaternion};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Noise assumed where a robot file states none, as a fraction of the effort limit (or of 100 N m
+/// or N); the figure of the report before the run.
+pub const DEFAULT_NOISE: f64 = crate::identifiability::DEFAULT_NOISE;
+
+/// The sensors of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensors {
+    /// standard deviation of the torque, actuator by actuator, N m or N
+    pub torque_noise: Vec<f64>,
+    /// step of the position sensors, rad or m; 0 for none
+    pub resolution: Vec<f64>,
+}
+
+impl Sensors {
+    /// As the robot file states them, the noise times `scale` (0: ideal sensors). Torque noise that
+    /// is not stated is assumed, with a warning; position steps that are not stated are 0.
+    pub fn new(plant: &Plant, scale: f64) -> (Self, Vec<Warning>) {
+        let mut missing = Vec::new();
+        let joints = plant.actuators();
+        let torque_noise = joints
+            .iter()
+            .map(|j| {
+                scale
+                    * j.torque_noise.unwrap_or_else(|| {
+                        missing.push(j.name.as_str());
+                        let effort = j.limits.effort;
+                        DEFAULT_NOISE * if effort.is_finite() { effort } else { 100.0 }
+                    })
+            })
+            .collect();
+        let resolution = joints
+            .iter()
+            .map(|j| match scale > 0.0 {
+                true => j.position_resolution.unwrap_or(0.0),
+                false => 0.0,
+            })
+            .collect();
+        let warnings = match missing.is_empty() || scale == 0.0 {
+            true => vec![],
+            false => vec![Warning::new(
+                "torque_noise",
+                format!(
+                    "not stated for {}: simulated as {} % of the effort limit",
+                    missing.join(", "),
+                    100.0 * DEFAULT_NOISE
+                ),
+            )],
+        };
+        let sensors = Sensors {
+            torque_noise,
+            resolution,
+        };
+        (sensors, warnings)
+    }
+}
+
+/// Measured positions and torques, actuator-major.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// positions, rad or m
+    pub q: Vec<f64>,
+    /// torques or forces, N m or N
+    pub tau: Vec<f64>,
+}
+
+/// A standard normal number (Box & Muller 1958).
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    let u: f64 = 1.0 - rng.random::<f64>();
+    let v: f64 = rng.random();
+    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
+/// Measures a run: positions rounded to the encoder's step, white noise on the torques.
+pub fn measure(run: &Run, sensors: &Sensors, effects: &Effects, seed: u64) -> Measured {
+    let count = run.t.len();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5e_4502);
+    let (mut q, mut tau) = (run.actuators.q.clone(), run.tau_seen.clone());
+    for (a, (&noise, &step)) in sensors
+        .torque_noise
+        .iter()
+        .zip(&sensors.resolution)
+        .enumerate()
+    {
+        let effect = effects.joint(a);
+        // where the steps of the encoder lie is chance, another one in every rehearsal
+        let phase: f64 = rng.random();
+        for v in &mut q[a * count..(a + 1) * count] {
+            *v += effect.position_offset;
+            if step > 0.0 {
+                *v = ((*v / step + phase).round() - phase) * step;
+            }
+        }
+        for v in &mut tau[a * count..(a + 1) * count] {
+            *v *= effect.torque_gain;
+            if noise > 0.0 {
+                *v += noise * normal(&mut rng);
+            }
+        }
+    }
+    Measured { q, tau }
+}
+
+/// Which columns a log has beside `t`, `q`, `tau` and `qref`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Columns {
+    /// true velocities and accelerations of the actuators, `dq`, `ddq`
+    pub derivatives: bool,
+    /// true pose of the platform, `x y z qw qx qy qz`
+    pub pose: bool,
+}
+
+/// Writes a log as `docs/formats.md` describes it.
+///
+/// # Errors
+/// A pose of a robot without platform; otherwise as [`write_atomic`].
+pub fn write_log(
+    path: impl AsRef<Path>,
+    force: bool,
+    plant: &Plant,
+    run: &Run,
+    measured: &Measured,
+    columns: Columns,
+) -> Result<()> {
+    let count = run.t.len();
+    let na = run.actuators.dof;
+    let mut head = String::from("t");
+    let mut data: Vec<&[f64]> = Vec::new();
+    let mut add = |name: &str, values: &'_ [f64]| {
+        for a in 0..na {
+            let _ = write!(head, ",{name}{}", a + 1);
+        }
+        debug_assert_eq!(values.len(), na * count);
+    };
+    add("q", &measured.q);
+    add("tau", &measured.tau);
+    add("qref", &run.reference);
+    let mut sources = vec![&measured.q, &measured.tau, &run.reference];
+    if columns.derivatives {
+        add("dq", &run.actuators.qd);
+        add("ddq", &run.actuators.qdd);
+        sources.extend([&run.actuators.qd, &run.actuators.qdd]);
+    }
+    for source in sources {
+        data.extend(source.chunks_exact(count));
+    }
+    let pose = match columns.pose {
+        true => poses(plant, run)?,
+        false => Vec::new(),
+    };
+    if columns.pose {
+        head.push_str(",x,y,z,qw,qx,qy,qz");
+    }
+    data.extend(pose.iter().map(Vec::as_slice));
+    head.push('\n');
+    write_atomic(path, force, |w| {
+        w.write_all(head.as_bytes())?;
+        let mut line = String::new();
+        for k in 0..count {
+            line.clear();
+            let _ = write!(line, "{}", run.t[k]);
+            for column in &data {
+                let _ = write!(line, ",{}", column[k]);
+            }
+            line.push('\n');
+            w.write_all(line.as_bytes())?;
+        }
+        Ok(())
+    })
+}
+
+/// Columns `x y z qw qx qy qz` of the platform.
+fn poses(plant: &Plant, run: &Run) -> Result<Vec<Vec<f64>>> {
+    let count = run.t.len();
+    let Some(mechanism) = plant.mechanism() else {
+        return Err(Error::Argument(format!(
+            "--pose: {} has no platform; it is for parallel robots",
+            plant.name()
+        )));
+    };
+    let m = run.motion.dof;
+    let zero = vec![0.0; m];
+    let mut columns = vec![Vec::with_capacity(count); 7];
+    let mut last: Option<UnitQuaternion<f64>> = None;
+    for k in 0..count {
+        let x: Vec<f64> = (0..m).map(|c| run.motion.q[c * count + k]).collect();
+        let Some(pose) = mechanism.task.motion(&x, &zero, &zero) else {
+            return Err(Error::Argument(format!(
+                "--pose: {} has joints, not a platform, as its coordinates",
+                plant.name()
+            )));
+        };
+        let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
+        let mut q = UnitQuaternion::from_rotation_matrix(&rotation);
+        // the sign that is nearest to the one before: no jumps in the log
+        if last.is_some_and(|l| l.coords.dot(&q.coords) < 0.0) {
+            q = UnitQuaternion::new_unchecked(-q.into_inner());
+        }
+        last = Some(q);
+        let p = pose.position;
+        for (column, v) in columns.iter_mut().zip([p.x, p.y, p.z, q.w, q.i, q.j, q.k]) {
+            column.push(v);
+        }
+    }
+    Ok(columns)
+}

@@ -1,0 +1,511 @@
+//! Trees with loops: against the mechanisms in closed form, against differences, and files of them.
+
+mod common;
+
+use common::parallel::{delta, h4, hexapod, reference};
+use excite::dynamics::{Isa, Samples};
+use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
+use excite::mechanism::{ClosedWorkspace, Mechanism, TaskDerivatives};
+use nalgebra::{Matrix3, Vector3};
+use rand::Rng;
+use std::path::Path;
+
+fn frame(body: usize, position: Vector3<f64>) -> Frame {
+    Frame {
+        name: format!("body {body}"),
+        body: Some(body),
+        rotation: Matrix3::identity(),
+        position,
+    }
+}
+
+/// The tree of a mechanism in closed form, its loops closed by balls, started near home.
+fn opened(m: &Mechanism, balls: Vec<[(String, Vector3<f64>); 2]>) -> Mechanism {
+    let body = |name: &str| m.robot.bodies.iter().position(|b| b.name == name).unwrap();
+    let closures = balls
+        .into_iter()
+        .map(|[a, b]| Closure {
+            frames: [frame(body(&a.0), a.1), frame(body(&b.0), b.1)],
+            coincide: Coincide::Position,
+        })
+        .collect();
+    let mut start = m.inverse(&m.home).unwrap();
+    for (i, q) in start.iter_mut().enumerate() {
+        if !m.actuated.contains(&i) {
+            *q += 0.02 * (i as f64).sin();
+        }
+    }
+    Loops {
+        robot: m.robot.clone(),
+        closures,
+        actuated: m.actuated.clone(),
+        start,
+        unknown: m.parameters.bodies.clone(),
+        length: None,
+    }
+    .build()
+    .unwrap()
+}
+
+/// Mechanisms in closed form, each beside the same one with loops.
+fn pairs() -> Vec<(Mechanism, Mechanism)> {
+    let mut all = Vec::new();
+    let robot = hexapod(&reference("sg").0);
+    let m = robot.build().unwrap();
+    let balls = (robot.legs.iter().enumerate())
+        .map(|(i, leg)| {
+            let rod = (format!("rod{}", i + 1), Vector3::zeros());
+            [rod, ("platform".to_string(), leg.platform)]
+        })
+        .collect();
+    let o = opened(&m, balls);
+    all.push((m, o));
+    let ends = |chains: &[excite::mechanism::parallelogram::Chain], h4: bool| {
+        let mut balls = Vec::new();
+        for (i, c) in chains.iter().enumerate() {
+            for (rod, side) in [("a", 0.5), ("b", -0.5)] {
+                let across = c.rotation.column(0) * (side * c.width);
+                let to = match h4 {
+                    true => format!("bar{}", c.hinge + 1),
+                    false => "platform".to_string(),
+                };
+                balls.push([
+                    (
+                        format!("rod{}{rod}", i + 1),
+                        Vector3::new(0.0, 0.0, c.rod_length),
+                    ),
+                    (to, c.attachment + across),
+                ]);
+            }
+        }
+        balls
+    };
+    let robot = h4(&reference("h4").0);
+    let m = robot.build().unwrap();
+    let o = opened(&m, ends(&robot.chains, true));
+    all.push((m, o));
+    let robot = delta(&reference("delta").0);
+    let m = robot.build().unwrap();
+    let o = opened(&m, ends(&robot.chains, false));
+    all.push((m, o));
+    all
+}
+
+/// A motion of the actuators of `m`, from random states of its platform.
+fn motions(m: &Mechanism, count: usize, seed: u64) -> (Samples, Samples) {
+    let r = &mut common::rng(seed);
+    let n = m.freedoms();
+    let mut x = Samples::zeros(n, count);
+    for k in 0..n {
+        let [low, high] = m.workspace[k].position;
+        for s in 0..count {
+            x.q[k * count + s] = r.random_range(low..high);
+            x.qd[k * count + s] = r.random_range(-1.0..1.0);
+            x.qdd[k * count + s] = r.random_range(-8.0..8.0);
+        }
+    }
+    let all = m.motion(&x).unwrap().tree;
+    let take = |a: &[f64]| -> Vec<f64> {
+        let rows = m.actuated.iter();
+        rows.flat_map(|&j| a[j * count..(j + 1) * count].to_vec())
+            .collect()
+    };
+    let actuators = Samples {
+        dof: m.actuators(),
+        count,
+        q: take(&all.q),
+        qd: take(&all.qd),
+        qdd: take(&all.qdd),
+    };
+    (x, actuators)
+}
+
+fn worst(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let scale = b.iter().fold(1.0f64, |m, x| m.max(x.abs()));
+    a.iter()
+        .zip(b)
+        .fold(0.0f64, |m, (x, y)| m.max((x - y).abs()))
+        / scale
+}
+
+#[test]
+fn loops_move_as_the_closed_form_does() {
+    for (closed, loops) in pairs() {
+        assert_eq!(loops.freedoms(), closed.freedoms());
+        let (x, actuators) = motions(&closed, 40, 3);
+        let a = closed.motion(&x).unwrap().tree;
+        let b = loops.motion(&actuators).unwrap().tree;
+        // joints of the platform come first or last in either; they are the same tree
+        let off = [
+            worst(&b.q, &a.q),
+            worst(&b.qd, &a.qd),
+            worst(&b.qdd, &a.qdd),
+            worst(
+                &loops.nominal_torque(&actuators).unwrap(),
+                &closed.nominal_torque(&x).unwrap(),
+            ),
+        ];
+        println!("{}: q, qd, qdd, torque off by {off:?}", closed.kind);
+        assert!(off.iter().all(|o| *o < 1e-9), "{}: {off:?}", closed.kind);
+        let w = loops.regressor(&actuators).unwrap();
+        let v = closed.regressor(&x).unwrap();
+        assert_eq!(w.ncols(), v.ncols());
+        let mut off = 0.0f64;
+        for c in 0..w.ncols() {
+            let column = |m: &faer::Mat<f64>| (0..m.nrows()).map(|r| m[(r, c)]).collect::<Vec<_>>();
+            off = off.max(worst(&column(&w), &column(&v)));
+        }
+        println!("{}: regressor off by {off:.1e}", closed.kind);
+        assert!(off < 1e-9);
+        assert_eq!(
+            loops.base().unwrap().count(),
+            closed.base().unwrap().count()
+        );
+    }
+}
+
+/// Central differences of the geometry's first outputs against its own derivatives.
+fn derivatives(m: &Mechanism, seed: u64) {
+    let (n, t) = (m.robot.dof(), m.freedoms());
+    let r = &mut common::rng(seed);
+    let mut x = Samples::zeros(t, 1);
+    for k in 0..t {
+        let [low, high] = m.workspace[k].position;
+        x.q[k] = low + (high - low) * r.random_range(0.3..0.7);
+        x.qd[k] = r.random_range(-1.0..1.0);
+        x.qdd[k] = r.random_range(-3.0..3.0);
+    }
+    let u: Vec<f64> = (0..t).map(|_| r.random_range(-1.0..1.0)).collect();
+    let g = m.geometry();
+    let zero = || vec![0.0; n * t];
+    let (mut d, mut dqd, mut dqdd, mut bend) = (zero(), zero(), zero(), zero());
+    g.sensitivity(Isa::Scalar, &x, &mut d, &mut dqd, &mut dqdd);
+    g.curvature(Isa::Scalar, &x, &u, &mut bend);
+    let at = |k: usize, h: f64| {
+        let mut moved = x.clone();
+        moved.q[k] += h;
+        let (mut motion, mut d) = (Samples::zeros(n, 1), zero());
+        g.motion(Isa::Scalar, &moved, &mut motion, &mut d);
+        (motion, d)
+    };
+    let mut off = [0.0f64; 4];
+    for k in 0..t {
+        let h = 1e-4;
+        let ((a, da), (b, db)) = (at(k, h), at(k, -h));
+        let ((a2, da2), (b2, db2)) = (at(k, 2.0 * h), at(k, -2.0 * h));
+        // fourth order
+        let diff = |p: f64, m: f64, p2: f64, m2: f64| (8.0 * (p - m) - (p2 - m2)) / (12.0 * h);
+        for i in 0..n {
+            let own = [
+                d[i * t + k],
+                dqd[i * t + k],
+                dqdd[i * t + k],
+                bend[i * t + k],
+            ];
+            let along = |d: &[f64]| (0..t).map(|l| d[i * t + l] * u[l]).sum::<f64>();
+            let quotient = [
+                diff(a.q[i], b.q[i], a2.q[i], b2.q[i]),
+                diff(a.qd[i], b.qd[i], a2.qd[i], b2.qd[i]),
+                diff(a.qdd[i], b.qdd[i], a2.qdd[i], b2.qdd[i]),
+                diff(along(&da), along(&db), along(&da2), along(&db2)),
+            ];
+            for (o, (x, y)) in off.iter_mut().zip(own.iter().zip(quotient)) {
+                *o = o.max((x - y).abs() / (1.0 + y.abs()));
+            }
+        }
+    }
+    println!(
+        "{} {}: D, dqd, dqdd, curvature off by {off:?}",
+        m.kind, m.robot.name
+    );
+    assert!(off.iter().all(|o| *o < 1e-7), "{off:?}");
+}
+
+#[test]
+fn derivatives_are_those_of_differences() {
+    for (_, loops) in pairs() {
+        derivatives(&loops, 11);
+    }
+    for top in [POINT, POSE] {
+        derivatives(&five_bar(top).unwrap(), 12);
+    }
+    // of a sum of torques, redundant actuators included
+    for top in [POINT, REDUNDANT] {
+        let m = five_bar(top).unwrap();
+        let x = m.random_states(1, 5);
+        let raw = m.parameters.expand(&m.parameters.values());
+        let rates: Vec<f64> = (0..m.actuators()).map(|a| 0.7 - 0.4 * a as f64).collect();
+        let mut out = TaskDerivatives::default();
+        let ws = &mut ClosedWorkspace::default();
+        m.gradients(ws, &raw, &x, &rates, &mut out).unwrap();
+        let sum = |x: &Samples| -> f64 {
+            let tau = m.torque(x, &m.parameters.values()).unwrap();
+            tau.iter().zip(&rates).map(|(t, r)| t * r).sum()
+        };
+        for k in 0..m.freedoms() {
+            let h = 1e-5;
+            for (which, own) in [(0, &out.x), (1, &out.xd), (2, &out.xdd)] {
+                let moved = |h: f64| {
+                    let mut x = x.clone();
+                    [&mut x.q, &mut x.qd, &mut x.qdd][which][k] += h;
+                    sum(&x)
+                };
+                let quotient = (moved(h) - moved(-h)) / (2.0 * h);
+                let off = (own[k] - quotient).abs() / (1.0 + quotient.abs());
+                assert!(off < 1e-6, "{top} {which} {k}: {} {quotient}", own[k]);
+            }
+        }
+    }
+}
+
+/// A five-bar linkage in the plane, both distal links on a pin `tip`.
+const URDF: &str = r#"<robot name="five_bar">
+<link name="base"/>
+<link name="left1"><inertial><origin xyz="0.1 0.01 0"/><mass value="0.5"/>
+ <inertia ixx="0.0005" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.003"/></inertial></link>
+<link name="left2"><inertial><origin xyz="0.15 0 0"/><mass value="0.3"/>
+ <inertia ixx="0.0003" ixy="0" ixz="0" iyy="0.004" iyz="0" izz="0.004"/></inertial></link>
+<link name="right1"><inertial><origin xyz="0.1 -0.01 0"/><mass value="0.6"/>
+ <inertia ixx="0.0005" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.003"/></inertial></link>
+<link name="right2"><inertial><origin xyz="0.15 0 0.01"/><mass value="0.3"/>
+ <inertia ixx="0.0003" ixy="0" ixz="0" iyy="0.004" iyz="0" izz="0.004"/></inertial></link>
+<link name="tip"/>
+<link name="left_end"/>
+<link name="right_end"/>
+<joint name="motor_left" type="revolute"><parent link="base"/><child link="left1"/>
+ <axis xyz="0 0 1"/><limit lower="-4" upper="4" effort="10" velocity="20"/></joint>
+<joint name="elbow_left" type="revolute"><parent link="left1"/><child link="left2"/>
+ <origin xyz="0.2 0 0"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="50"/>
+ <dynamics damping="0.02"/></joint>
+<joint name="motor_right" type="revolute"><parent link="base"/><child link="right1"/>
+ <origin xyz="0.15 0 0"/><axis xyz="0 0 1"/><limit lower="-4" upper="4" effort="10" velocity="20"/></joint>
+<joint name="elbow_right" type="revolute"><parent link="right1"/><child link="right2"/>
+ <origin xyz="0.2 0 0"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="50"/></joint>
+<joint name="pin" type="revolute"><parent link="left2"/><child link="tip"/>
+ <origin xyz="0.3 0 0"/><axis xyz="0 0 1"/><limit lower="-4" upper="4" effort="1" velocity="50"/></joint>
+<joint name="at_left" type="fixed"><parent link="left2"/><child link="left_end"/><origin xyz="0.3 0 0"/></joint>
+<joint name="at_right" type="fixed"><parent link="right2"/><child link="right_end"/><origin xyz="0.3 0 0"/></joint>
+</robot>"#;
+
+const HEAD: &str = "mechanism = \"loops\"\nurdf = \"five_bar.urdf\"\ngravity = [0, -9.81, 0]\n\
+start = { motor_left = 2.2, elbow_left = -1.2, motor_right = 0.9, elbow_right = 1.2, pin = 0.1 }\n";
+const POINT: &str = "lock = { pin = 0.0 }\nactuated = [\"motor_left\", \"motor_right\"]\n\
+[[loop]]\nframes = [\"left_end\", \"right_end\"]\ncoincide = \"position\"\n";
+const POSE: &str = "actuated = [\"motor_left\", \"motor_right\"]\n\
+[[loop]]\nframes = [\"tip\", \"right_end\"]\ncoincide = \"pose\"\n";
+const REDUNDANT: &str = "lock = { pin = 0.0 }\n\
+actuated = [\"motor_left\", \"motor_right\", \"elbow_left\"]\n\
+[[loop]]\nframes = [{ link = \"left2\", position = [0.3, 0, 0] }, \"right_end\"]\n\
+coincide = \"position\"\n";
+
+/// The linkage with the rest of its file.
+fn five_bar(rest: &str) -> excite::Result<Mechanism> {
+    let head = match rest.contains("lock") {
+        true => HEAD.replace(", pin = 0.1", ""),
+        false => HEAD.to_string(),
+    };
+    file(&format!("{head}{rest}"), URDF)
+}
+
+fn file(toml: &str, urdf: &str) -> excite::Result<Mechanism> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    std::fs::write(&path, toml).unwrap();
+    std::fs::write(folder.path().join("five_bar.urdf"), urdf).unwrap();
+    Ok(Mechanism::load(path.to_str().unwrap())?.unwrap())
+}
+
+#[test]
+fn a_five_bar_is_the_textbook_one() {
+    let m = five_bar(POINT).unwrap();
+    println!("{:?}", m.warnings);
+    assert_eq!((m.freedoms(), m.actuators(), m.kind), (2, 2, "loops"));
+    assert_eq!(m.task_names, ["motor_left", "motor_right"]);
+    // tip by the intersection of two circles
+    let states = m.random_states(50, 2);
+    let motion = m.motion(&states).unwrap();
+    for s in 0..50 {
+        let [a, b] = [0, 1].map(|k| states.q[k * 50 + s]);
+        let p = [0.2 * a.cos(), 0.2 * a.sin()];
+        let r = [0.15 + 0.2 * b.cos(), 0.2 * b.sin()];
+        let (dx, dy) = (r[0] - p[0], r[1] - p[1]);
+        let half = 0.5 * dx.hypot(dy);
+        let up = (0.09 - half * half).sqrt();
+        // above the line from left to right
+        let tip = [
+            0.5 * (p[0] + r[0]) - up * dy / (2.0 * half),
+            0.5 * (p[1] + r[1]) + up * dx / (2.0 * half),
+        ];
+        let q = |j: usize| motion.tree.q[j * 50 + s];
+        let angle = q(0) + q(1);
+        let own = [p[0] + 0.3 * angle.cos(), p[1] + 0.3 * angle.sin()];
+        assert!((own[0] - tip[0]).abs() + (own[1] - tip[1]).abs() < 1e-12);
+    }
+    // a weld at a pinned frame is the same linkage, with rows that are redundant
+    let pose = five_bar(POSE).unwrap();
+    let states = m.random_states(20, 3);
+    let (a, b) = (
+        m.nominal_torque(&states).unwrap(),
+        pose.nominal_torque(&states).unwrap(),
+    );
+    assert!(worst(&a, &b) < 1e-11, "{}", worst(&a, &b));
+    // power of the actuators is the change of energy, whoever of three does the work
+    let redundant = five_bar(REDUNDANT).unwrap();
+    let said = |w: &excite::Warning| w.message.contains("3 actuators for 2 freedoms");
+    assert!(redundant.warnings.iter().any(said));
+    let motion = redundant.motion(&states).unwrap();
+    let c = redundant.nominal_torque(&states).unwrap();
+    for s in 0..20 {
+        let power = |tau: &[f64], rows: &[usize]| -> f64 {
+            let each = rows.iter().enumerate();
+            each.map(|(i, &j)| tau[i * 20 + s] * motion.tree.qd[j * 20 + s])
+                .sum()
+        };
+        let (two, three) = (power(&a, &m.actuated), power(&c, &redundant.actuated));
+        assert!(
+            (two - three).abs() < 1e-9 * (1.0 + two.abs()),
+            "{two} {three}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_closed_is_said_with_numbers() {
+    let refused = |rest: &str, urdf: &str, words: &[&str]| {
+        let head = match rest.contains("lock") {
+            true => HEAD.replace(", pin = 0.1", ""),
+            false => HEAD.to_string(),
+        };
+        let toml = match rest.contains("mechanism") {
+            true => rest.to_string(),
+            false => format!("{head}{rest}"),
+        };
+        let message = match file(&toml, urdf) {
+            Ok(_) => panic!("accepted, but should say {words:?}"),
+            Err(e) => e.to_string(),
+        };
+        println!("{message}");
+        for w in words {
+            assert!(message.contains(w), "no `{w}` in: {message}");
+        }
+    };
+    // too far apart to meet
+    let far = URDF.replace("xyz=\"0.15 0 0\"/><axis", "xyz=\"1.5 0 0\"/><axis");
+    assert_ne!(far, URDF);
+    refused(
+        POINT,
+        &far,
+        &[
+            "cannot be closed",
+            "left_end - right_end stays open by 0.",
+            "m",
+        ],
+    );
+    refused(
+        &POINT.replace(", \"motor_right\"", ""),
+        URDF,
+        &["an actuator is missing: 2 freedoms (4 joints, closures of rank 2) but 1"],
+    );
+    refused(
+        &POINT.replace("\"motor_right\"", "\"motor_left\""),
+        URDF,
+        &["line 6", "`motor_left` is listed twice"],
+    );
+    refused(
+        &POINT.replace("\"motor_right\"", "\"motor_rite\""),
+        URDF,
+        &["no joint `motor_rite`", "did you mean `motor_right`"],
+    );
+    refused(
+        &POINT.replace("\"right_end\"", "\"rigt_end\""),
+        URDF,
+        &["no link `rigt_end`", "did you mean `right_end`"],
+    );
+    refused(
+        &POINT.replace("\"right_end\"", "\"left2\""),
+        URDF,
+        &["the same body"],
+    );
+    refused(
+        &POINT.replace("\"position\"", "\"point\""),
+        URDF,
+        &["coincide = \"point\" must be"],
+    );
+    refused(
+        &format!("{POINT}[[joint]]\nname = \"elbow_left\"\n[[joint]]\nname = \"elbow_left\"\n"),
+        URDF,
+        &["joint `elbow_left`", "two [[joint]] entries"],
+    );
+    refused(
+        &POINT.replace("lock = { pin", "lock = { pim"),
+        URDF,
+        &["no joint `pim`", "did you mean `pin`"],
+    );
+    // two joints of one arm hold the linkage, but not those that move with each other
+    let m = five_bar(POINT).unwrap();
+    let x = [m.home[0] + 2.5, m.home[1] - 2.5];
+    let why = m.problem(&x).unwrap();
+    println!("{why}");
+    assert!(why.contains("cannot be followed further") && why.contains("singular value"));
+}
+
+#[test]
+fn the_layout_of_example_parallel_robots_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let robot = folder.path().join("five_bar_3d");
+    std::fs::create_dir(&robot).unwrap();
+    // the pin as a ball, and a start near the closed configuration
+    let near = URDF
+        .replace(
+            "<child link=\"left1\"/>",
+            "<child link=\"left1\"/><origin rpy=\"0 0 2.2\"/>",
+        )
+        .replace("<origin xyz=\"0.2 0 0\"/><axis xyz=\"0 0 1\"/><limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"50\"/>\n", "<origin xyz=\"0.2 0 0\" rpy=\"0 0 -1.2\"/><axis xyz=\"0 0 1\"/><limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"50\"/>\n")
+        .replace(
+            "<origin xyz=\"0.15 0 0\"/><axis",
+            "<origin xyz=\"0.15 0 0\" rpy=\"0 0 0.9\"/><axis",
+        )
+        .replace("<child link=\"right2\"/>\n <origin xyz=\"0.2 0 0\"/>", "<child link=\"right2\"/>\n <origin xyz=\"0.2 0 0\" rpy=\"0 0 1.2\"/>");
+    std::fs::write(robot.join("robot.urdf"), near).unwrap();
+    let write = |yaml: &str| std::fs::write(robot.join("robot.yaml"), yaml).unwrap();
+    let load = |p: &Path| Mechanism::load(p.to_str().unwrap()).map(Option::unwrap);
+    write(
+        "closed_loop: [['tip', 'right_end']]\ntype: ['6d']\n\
+         name_mot: ['motor_left', 'motor_right']\n\
+         joint_name: ['pin']\njoint_type: ['SPHERICAL']\n",
+    );
+    let ball = load(&robot).unwrap();
+    println!("{:?}\n{:?}", ball.robot.joint_names(), ball.warnings);
+    assert_eq!(ball.robot.name, "five_bar_3d");
+    assert_eq!((ball.freedoms(), ball.robot.dof()), (2, 7));
+    assert!(ball.robot.joint_names().contains(&"pin_Y".to_string()));
+    write(
+        "closed_loop: [['left_end', 'right_end']]\ntype: ['3d']\n\
+         name_mot: ['motor_left', 'motor_right']\njoint_name: ['pin']\njoint_type: ['FIXED']\n",
+    );
+    let point = load(&robot.join("robot.yaml")).unwrap();
+    assert_eq!((point.freedoms(), point.robot.dof()), (2, 4));
+    let x = point.random_states(10, 1);
+    let (a, b) = (
+        point.nominal_torque(&x).unwrap(),
+        ball.nominal_torque(&x).unwrap(),
+    );
+    assert!(worst(&a, &b) < 1e-10, "{:e}", worst(&a, &b));
+    write("closed_loop: [['left_end', 'nowhere']]\nname_mot: ['motor_left', 'motor_right']\n");
+    let error = load(&robot).unwrap_err().to_string();
+    assert!(error.contains("no link `nowhere`"), "{error}");
+    write("closed_loop: [['left_end', 'right_end']]\ntype: ['3d']\nname_mot: ['motor_left']\n");
+    let error = load(&robot).unwrap_err().to_string();
+    assert!(
+        error.contains("an actuator is missing: 3 freedoms"),
+        "{error}"
+    );
+    std::fs::remove_file(robot.join("robot.urdf")).unwrap();
+    assert!(
+        load(&robot)
+            .unwrap_err()
+            .to_string()
+            .contains("no URDF beside it")
+    );
+}

@@ -1,0 +1,506 @@
+//! Robot files of parallel robots: what they say is what the mechanism does, through the program,
+//! and mistakes in them are named.
+
+mod common;
+
+use assert_cmd::Command;
+use common::parallel::{checks, matrix, numbers, reference};
+use common::parallel_toml::{chains, hexapod};
+use excite::Plant;
+use excite::mechanism::{Mechanism, bundled};
+use nalgebra::{Rotation3, UnitQuaternion};
+use serde_json::Value;
+use std::path::Path;
+
+/// `excite torque` of a robot file and a motion.
+fn torque(folder: &Path, toml: &str, csv: &str) -> Vec<Vec<f64>> {
+    std::fs::write(folder.join("robot.toml"), toml).unwrap();
+    std::fs::write(folder.join("motion.csv"), csv).unwrap();
+    let out = Command::cargo_bin("excite")
+        .unwrap()
+        .current_dir(folder)
+        .args(["torque", "robot.toml", "motion.csv"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(out.stdout).unwrap();
+    let error = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{error}");
+    let mut lines = text.lines();
+    assert!(lines.next().unwrap().starts_with("t,tau1,tau2,tau3"));
+    lines
+        .map(|l| l.split(',').skip(1).map(|x| x.parse().unwrap()).collect())
+        .collect()
+}
+
+/// A CSV with one line a case.
+fn csv(names: &str, rows: impl Iterator<Item = Vec<f64>>) -> String {
+    let mut text = format!("t,{}\n", names.replace(' ', ","));
+    for (i, row) in rows.enumerate() {
+        let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
+        text += &format!("{i},{}\n", row.join(","));
+    }
+    text
+}
+
+fn compare(what: &str, ours: &[Vec<f64>], cases: &[Value], key: &str) {
+    assert_eq!(ours.len(), cases.len());
+    let mut worst = 0.0f64;
+    for (ours, case) in ours.iter().zip(cases) {
+        let theirs = numbers(&case[key]);
+        assert_eq!(ours.len(), theirs.len());
+        for (a, b) in ours.iter().zip(&theirs) {
+            worst = worst.max((a - b).abs());
+        }
+    }
+    println!("{what}: {} cases, {worst:.1e}", cases.len());
+    assert!(worst < 1e-9, "{what}: {worst:e}");
+}
+
+const POSE: &str = "x y z qw qx qy qz vx vy vz wx wy wz ax ay az alx aly alz";
+
+#[test]
+fn hexapod_forces_of_the_reference_cases() {
+    let (model, cases) = reference("sg");
+    let folder = tempfile::tempdir().unwrap();
+    let rows = cases.iter().map(|c| {
+        let r = Rotation3::from_matrix_unchecked(matrix(&c["R"]));
+        let q = UnitQuaternion::from_rotation_matrix(&r).into_inner();
+        [
+            numbers(&c["p"]),
+            vec![q.w, q.i, q.j, q.k],
+            numbers(&c["v"]),
+            numbers(&c["w"]),
+            numbers(&c["vd"]),
+            numbers(&c["wd"]),
+        ]
+        .concat()
+    });
+    let toml = hexapod(&model, "", "");
+    let ours = torque(folder.path(), &toml, &csv(POSE, rows));
+    compare("hexapod", &ours, &cases, "f_numpy");
+}
+
+#[test]
+fn h4_and_delta_torques_of_the_reference_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = "x y z theta dx dy dz dtheta ddx ddy ddz ddtheta";
+    let (model, cases) = reference("h4");
+    let row = |c: &Value| ["x", "xd", "xdd"].map(|k| numbers(&c[k])).concat();
+    let table = csv(names, cases.iter().map(row));
+    let toml = chains(&model, "h4", "", "");
+    let ours = torque(folder.path(), &toml, &table);
+    compare("H4", &ours, &cases, "tau_numpy");
+    let toml = chains(&model, "h4", "model = \"lumped-gravity\"", "");
+    let ours = torque(folder.path(), &toml, &table);
+    compare("H4 lumped", &ours, &cases, "tau_lumped_model");
+    // the same motion as a pose
+    let as_pose = cases.iter().map(|c| {
+        let [x, xd, xdd] = ["x", "xd", "xdd"].map(|k| numbers(&c[k]));
+        let half = 0.5 * x[3];
+        [
+            x[0],
+            x[1],
+            x[2],
+            half.cos(),
+            0.0,
+            0.0,
+            half.sin(),
+            xd[0],
+            xd[1],
+            xd[2],
+            0.0,
+            0.0,
+            xd[3],
+            xdd[0],
+            xdd[1],
+            xdd[2],
+            0.0,
+            0.0,
+            xdd[3],
+        ]
+        .to_vec()
+    });
+    let toml = chains(&model, "h4", "", "");
+    let ours = torque(folder.path(), &toml, &csv(POSE, as_pose));
+    compare("H4 by pose", &ours, &cases, "tau_numpy");
+
+    let (model, cases) = reference("delta");
+    let toml = chains(&model, "delta", "", "");
+    let table = csv("x y z dx dy dz ddx ddy ddz", cases.iter().map(row));
+    let ours = torque(folder.path(), &toml, &table);
+    compare("Delta", &ours, &cases, "tau_numpy");
+    let as_pose = cases.iter().map(|c| {
+        let mut row = numbers(&c["x"]);
+        row.extend([1.0, 0.0, 0.0, 0.0]);
+        row.extend(numbers(&c["xd"]));
+        row.extend([0.0; 3]);
+        row.extend(numbers(&c["xdd"]));
+        row.extend([0.0; 3]);
+        row
+    });
+    let ours = torque(folder.path(), &toml, &csv(POSE, as_pose));
+    compare("Delta by pose", &ours, &cases, "tau_numpy");
+}
+
+/// Base parameters of a file, through the loader that all commands use.
+fn count(toml: &str) -> usize {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    std::fs::write(&path, toml).unwrap();
+    let plant = Plant::load(path.to_str().unwrap()).unwrap();
+    plant.base().unwrap().count()
+}
+
+#[test]
+fn base_parameter_counts_of_robot_files() {
+    let counts: Option<Value> = checks().map(|f| {
+        let text = std::fs::read_to_string(f.join("base_parameter_counts.json")).unwrap();
+        serde_json::from_str(&text).unwrap()
+    });
+    if counts.is_none() {
+        println!("reference folder absent: counts as known");
+    }
+    let expect = |line: &str, ours: usize, known: usize| {
+        let theirs = counts
+            .as_ref()
+            .map_or(known as u64, |c| c[line].as_u64().unwrap());
+        println!("{line}: {ours}");
+        assert_eq!((ours as u64, known as u64), (theirs, theirs), "{line}");
+    };
+    let (model, _) = reference("sg");
+    let motor = "identify = [\"armature\"]";
+    let all = "identify = [\"armature\", \"viscous\", \"coulomb\"]";
+    for (line, top, actuator, known) in [
+        (" A,B,P (130 raw)", "", "", 82),
+        (
+            " with U-cross bodies (190 raw)",
+            "bodies = \"cross\"",
+            "",
+            88,
+        ),
+        (
+            " + rotor/ball-screw inertia (6)",
+            "bodies = \"cross\"",
+            motor,
+            94,
+        ),
+        (" + 12 friction", "bodies = \"cross\"", all, 106),
+        (" platform only", "bodies = \"platform\"", "", 10),
+        (
+            " identical legs",
+            "bodies = \"cross\"\nidentical = true",
+            "",
+            23,
+        ),
+        (
+            " identical axisymmetric legs",
+            "identical = true\naxisymmetric = true",
+            "",
+            14,
+        ),
+        (
+            " individual axisymmetric legs",
+            "axisymmetric = true",
+            "",
+            34,
+        ),
+    ] {
+        let irregular = hexapod(&model, top, actuator);
+        expect(
+            &format!("SG 6-UPS irregular{line}"),
+            count(&irregular),
+            known,
+        );
+        // the same bodies on two rings
+        let mut kept = String::new();
+        for l in irregular.lines() {
+            let key = l.split(" = ").next().unwrap_or("");
+            if !matches!(key, "base" | "platform" | "rotation") {
+                kept += l;
+                kept.push('\n');
+            }
+        }
+        let rings = |radius: f64, half: f64| {
+            let angles: Vec<f64> = (0..6)
+                .map(|i| {
+                    let pair = f64::from(i / 2) * std::f64::consts::TAU / 3.0;
+                    pair + if i % 2 == 0 { -half } else { half }
+                })
+                .collect();
+            format!("{{ radius = {radius:?}, angles = {angles:?} }}")
+        };
+        let regular = kept.replace(
+            "[legs]\n",
+            &format!(
+                "[legs]\nbase = {}\nplatform = {}\n",
+                rings(0.6, 0.2085),
+                rings(0.35, 0.88)
+            ),
+        );
+        expect(&format!("SG 6-UPS regular{line}"), count(&regular), known);
+    }
+    for (kind, name, known) in [
+        ("h4", "H4-like", [48, 48, 56, 4, 15]),
+        ("delta", "Delta", [34, 34, 40, 1, 12]),
+    ] {
+        let (model, _) = reference(kind);
+        for ((line, top, actuator), known) in [
+            (" bodies", "", ""),
+            (" + motor inertia", "", motor),
+            (" + friction", "", all),
+            (" platform", "bodies = \"platform\"", ""),
+            (" identical chains", "identical = true", ""),
+        ]
+        .into_iter()
+        .zip(known)
+        {
+            let toml = chains(&model, kind, top, actuator);
+            expect(&format!("{name}{line}"), count(&toml), known);
+        }
+    }
+}
+
+#[test]
+fn bundled_robots_are_sound_in_their_whole_workspace() {
+    for b in bundled::list() {
+        let m = b.load().unwrap();
+        assert!(m.warnings.is_empty(), "{}: {:?}", b.name, m.warnings);
+        assert_eq!(m.robot.name, b.name);
+        let states = m.random_states(300, 5);
+        let motion = m.motion(&states).unwrap();
+        let (mut worst, mut cone) = (f64::INFINITY, 0.0f64);
+        let mut reach = vec![[f64::INFINITY, f64::NEG_INFINITY]; m.actuators()];
+        for s in 0..states.count {
+            let x: Vec<f64> = (0..m.freedoms())
+                .map(|k| states.q[k * states.count + s])
+                .collect();
+            let singularity = m.singularity(&x).unwrap();
+            worst = worst.min(singularity.actuation.sigma_min);
+            if let Some(c) = singularity.constraint {
+                worst = worst.min(c.sigma_min);
+            }
+            for c in m.geometry().cones(&x) {
+                cone = cone.max(c.angle / c.limit);
+            }
+            for (r, &a) in reach.iter_mut().zip(&m.actuated) {
+                let q = motion.tree.q[a * states.count + s];
+                *r = [r[0].min(q), r[1].max(q)];
+            }
+        }
+        println!(
+            "{}: sigma_min {worst:.3}, cones {cone:.2}, reach {reach:.3?}",
+            b.name
+        );
+        assert!(worst > 0.1, "{}: {worst}", b.name);
+        assert!(cone < 1.0);
+        // home reads inside the limits with room to either side
+        let home = m.actuator_positions(&m.home).unwrap();
+        for (q, &a) in home.iter().zip(&m.actuated) {
+            let [low, high] = m.robot.joints[a].limits.position;
+            assert!(q - low > 0.2 * (high - low) && high - q > 0.2 * (high - low));
+        }
+        let mut at_home = excite::dynamics::Samples::zeros(m.freedoms(), 1);
+        at_home.q.copy_from_slice(&m.home);
+        let hold = m.nominal_torque(&at_home).unwrap();
+        println!("{}: holds itself with {hold:.2?}", b.name);
+        for (tau, &a) in hold.iter().zip(&m.actuated) {
+            assert!(tau.abs() < 0.5 * m.robot.joints[a].limits.effort);
+        }
+    }
+    let out = Command::cargo_bin("excite")
+        .unwrap()
+        .args(["robots", "--sources"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(out.stdout).unwrap();
+    for b in bundled::list() {
+        assert!(text.contains(b.name) && text.contains(b.description));
+    }
+}
+
+/// The error of a file's text, which must hold all the words.
+fn refused(toml: &str, words: &[&str]) {
+    let message = match Mechanism::from_toml_str(toml, "robot.toml") {
+        Ok(_) => panic!("accepted, but should say {words:?}"),
+        Err(e) => e.to_string(),
+    };
+    println!("{message}");
+    for word in words {
+        assert!(message.contains(word), "no `{word}` in: {message}");
+    }
+}
+
+#[test]
+fn mistakes_are_named_with_their_line() {
+    let hexapod = bundled::find("hexapod").unwrap().toml;
+    let h4 = bundled::find("h4").unwrap().toml;
+    let delta = bundled::find("delta").unwrap().toml;
+    refused(
+        &hexapod.replace("gough-stewart", "gough-steward"),
+        &["no kind of mechanism", "did you mean `gough-stewart`"],
+    );
+    refused(
+        &hexapod.replace("identical = true", "identcal = true"),
+        &["line ", "identcal", "identical"],
+    );
+    refused(
+        &hexapod.replace(
+            "home = [0.0, 0.0, 0.80, 0.0, 0.0, 0.0]",
+            "home = [0.0, 0.0, 0.8]",
+        ),
+        &["line 11", "home must be 6 finite numbers, here are 3"],
+    );
+    refused(
+        &hexapod.replace("3.9802902047863906, 4.39729020478639]", "3.98]"),
+        &["[legs] platform", "6 angles for 5 legs"],
+    );
+    refused(
+        &hexapod.replace("mass = 30.0", "mass = -30.0"),
+        &["line ", "[platform]", "mass = -30 kg"],
+    );
+    refused(
+        &hexapod.replace(
+            "axisymmetric = true",
+            "axisymmetric = false\nspherical = true",
+        ),
+        &["6-SPS", "axisymmetric = true"],
+    );
+    refused(
+        &h4.replacen("bar = 1", "bar = 3", 1),
+        &["chain 1", "bar = 3 must be 1 or 2"],
+    );
+    // unreachable home, with the number that shows it
+    refused(
+        &delta.replace("home = [0.0, 0.0, -0.65]", "home = [0.0, 0.0, -1.2]"),
+        &["home", "chain 1 does not reach", "1.20", "m"],
+    );
+    // a leg less: an actuator is missing
+    let mut fewer = String::new();
+    for (i, part) in h4.split("[[chain]]").enumerate() {
+        match i {
+            0 => fewer += part,
+            4 => {}
+            _ => fewer += &format!("[[chain]]{part}"),
+        }
+    }
+    refused(&fewer, &["an H4 has 4 chains, this one has 3"]);
+    let twice = "\n[[joint]]\nname = \"leg2_beta\"\nviscous = 0.1\n";
+    refused(
+        &format!("{hexapod}{twice}{twice}"),
+        &["joint `leg2_beta`", "two [[joint]] entries"],
+    );
+    refused(
+        &format!("{hexapod}\n[[joint]]\nname = \"leg7\"\n"),
+        &["no joint `leg7`", "leg1"],
+    );
+    refused(
+        &hexapod.replace("yaw = [-0.25, 0.25]", "theta = [-0.25, 0.25]"),
+        &["[workspace]", "no coordinate theta", "yaw"],
+    );
+    // friction of a passive joint is a column of its own
+    let with = format!("{hexapod}{twice}identify = [\"viscous\"]\n");
+    let m = Mechanism::from_toml_str(&with, "robot.toml").unwrap();
+    let known = |p: &excite::mechanism::Parameter| p.name == "leg2_beta.viscous";
+    assert!(m.parameters.list.iter().any(|p| known(p) && p.value == 0.1));
+}
+
+#[test]
+fn singular_layouts_are_said() {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    let h4 = bundled::find("h4").unwrap().toml;
+    let layout = |azimuths: [f64; 4], bars: [u8; 4]| {
+        let head = h4.split("[[chain]]").next().unwrap().to_string();
+        let mut text = head;
+        for (a, b) in azimuths.iter().zip(bars) {
+            let at = |r: f64| format!("[{:?}, {:?}, 0.0]", r * a.cos(), r * a.sin());
+            text += &format!(
+                "[[chain]]\nbar = {b}\nazimuth = {a:?}\nmotor = {}\nattachment = {}\n",
+                at(0.2),
+                at(0.05)
+            );
+        }
+        Mechanism::from_toml_str(&text, "h4.toml").unwrap().warnings
+    };
+    let first = layout([0.0, PI, FRAC_PI_2, 3.0 * FRAC_PI_2], [1, 1, 2, 2]);
+    println!("{first:?}");
+    assert!(
+        first
+            .iter()
+            .any(|w| w.message.contains("singular at home: the actuators"))
+    );
+    let second = [1.0, 3.0, 5.0, 7.0].map(|k| k * FRAC_PI_4);
+    let second = layout(second, [1, 1, 2, 2]);
+    println!("{second:?}");
+    assert!(
+        second
+            .iter()
+            .any(|w| w.message.contains("singular at home: the passive joints"))
+    );
+}
+
+#[test]
+fn a_tree_is_asked_for_where_only_a_tree_will_do() {
+    for (command, words) in [
+        ("new hexapod", "is not a .urdf file"),
+        ("torque hexapot none.csv", "did you mean `hexapod`"),
+    ] {
+        let out = Command::cargo_bin("excite")
+            .unwrap()
+            .args(command.split(' '))
+            .output()
+            .unwrap();
+        let text = String::from_utf8(out.stderr).unwrap();
+        println!("{text}");
+        assert!(!out.status.success());
+        assert!(text.contains(words), "{text}");
+    }
+    let error = excite::Robot::load("hexapod").unwrap_err().to_string();
+    assert!(error.contains("parallel robot"), "{error}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    std::fs::write(&path, bundled::find("delta").unwrap().toml).unwrap();
+    let error = excite::Robot::load(path.to_str().unwrap()).unwrap_err();
+    assert!(error.to_string().contains("parallel robot"), "{error}");
+}
+
+#[test]
+fn motions_that_the_platform_cannot_do_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("motion.csv");
+    let m = bundled::find("h4").unwrap().load().unwrap();
+    let refused = |text: String, words: &[&str]| {
+        std::fs::write(&file, text).unwrap();
+        let error = m.read_motion(&file).unwrap_err().to_string();
+        println!("{error}");
+        words
+            .iter()
+            .for_each(|w| assert!(error.contains(w), "no `{w}` in: {error}"));
+    };
+    let mut tilted = vec![0.0; 19];
+    (tilted[2], tilted[3], tilted[4]) = (-0.45, 0.1f64.cos(), 0.1f64.sin());
+    refused(
+        csv(POSE, std::iter::once(tilted.clone())),
+        &["line 2", "x, y, z, theta only"],
+    );
+    tilted[3] = 3.0;
+    refused(
+        csv(POSE, std::iter::once(tilted)),
+        &["line 2", "unit quaternion"],
+    );
+    refused("t,x,y,z\n0,0,0,0\n".into(), &["column theta", "missing"]);
+    refused(
+        "t,q1,dq1,ddq1\n0,0,0,0\n".into(),
+        &["motion of a platform is needed"],
+    );
+    // out of reach: which sample and by how much
+    let names = "x y z theta dx dy dz dtheta ddx ddy ddz ddtheta";
+    let mut far = vec![0.0; 12];
+    far[2] = -0.9;
+    std::fs::write(&file, csv(names, std::iter::once(far))).unwrap();
+    let (_, motion) = m.read_motion(&file).unwrap();
+    let error = m.nominal_torque(&motion).unwrap_err().to_string();
+    assert!(
+        error.contains("sample 0") && error.contains("does not reach"),
+        "{error}"
+    );
+}
