@@ -42,7 +42,7 @@ enum Command {
     Identify(identify::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
-    /// Diagnose
+    /// Diagnose the gap between a model and its robot
     Diagnose(diagnose::Args),
     /// Rehearse an experiment: simulate the robot and write a log
     Simulate(simulate::Args),

@@ -90,7 +90,19 @@ impl<'a> Data<'a> {
     ///
     /// # Errors
     /// Poses that cannot be reached.
-    pub fn new(plant: &'a Plant, mut records: Vec<Record>) -> Result<Self> {
+    pub fn new(plant: &'a Plant, records: Vec<Record>) -> Result<Self> {
+        Self::with_noise(plant, records, None)
+    }
+
+    /// The same with a noise that is known (for a motion that was not run yet).
+    ///
+    /// # Errors
+    /// As [`Data::new`].
+    pub fn with_noise(
+        plant: &'a Plant,
+        mut records: Vec<Record>,
+        noise: Option<Vec<Noise>>,
+    ) -> Result<Self> {
         for (k, r) in records.iter_mut().enumerate() {
             r.order = k;
         }
@@ -158,7 +170,10 @@ impl<'a> Data<'a> {
             range,
         };
         data.coulomb();
-        data.noise = (0..n).map(|j| data.first_noise(j)).collect();
+        data.noise = match noise {
+            Some(noise) => noise,
+            None => (0..n).map(|j| data.first_noise(j)).collect(),
+        };
         data.spread = data.prior();
         Ok(data)
     }
@@ -274,6 +289,7 @@ impl<'a> Data<'a> {
             .collect();
         if !parts.is_empty() {
             let mut noise = Noise::from_periods(&parts);
+            noise.limit(self.plant.actuators()[j].torque_noise);
             let excess = self.position_excess(j);
             noise.with_excess(&excess);
             return noise;

@@ -348,6 +348,35 @@ impl<'a> Evidence<'a> {
             .collect()
     }
 
+    /// Share of effect `a` with coefficients `eta` that effect `b` can imitate once the nominal model
+    /// has taken its share: the squared cosine of the projected angle.
+    pub fn overlap(&self, a: &Projected, eta: &[f64], b: &Projected) -> f64 {
+        let k = a.z.len().min(eta.len());
+        let own: f64 = (0..k)
+            .map(|i| (0..k).map(|m| eta[i] * a.s[(i, m)] * eta[m]).sum::<f64>())
+            .sum();
+        let cross = self.cross(b, a);
+        let rhs: Vec<f64> = (0..b.z.len())
+            .map(|i| (0..k).map(|m| cross[(i, m)] * eta[m]).sum())
+            .collect();
+        (solve(&b.s, &rhs).gain / own.max(1e-300)).clamp(0.0, 1.0)
+    }
+
+    /// A whitened residual as it was before, in units of the noise of each actuator.
+    pub fn unwhitened(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        residual
+            .par_iter()
+            .enumerate()
+            .map(|(j, e)| {
+                let mut out = Vec::with_capacity(e.len());
+                for k in 0..self.data.records.len() {
+                    self.data.noise[j].unwhiten(&e[self.data.span(k)], &mut out);
+                }
+                out
+            })
+            .collect()
+    }
+
     /// Energies of a whitened residual.
     pub fn energy(&self, residual: &[Vec<f64>]) -> Energy {
         let joints = residual

@@ -70,7 +70,8 @@ pub fn excess(record: &Record, e: &[f64]) -> (f64, f64) {
     (repeating, slow.max(broad))
 }
 
-/// Gap energy by actuator over the records that `pick` takes, in units of the noise variance.
+/// Gap energy by actuator over the records that `pick` takes, in units of the noise variance; what
+/// encoders cannot resolve is taken off.
 pub fn energies(data: &Data, residual: &[Vec<f64>], pick: impl Fn(&Record) -> bool) -> Vec<[f64; 2]> {
     (0..data.joints())
         .map(|j| {
@@ -78,7 +79,7 @@ pub fn energies(data: &Data, residual: &[Vec<f64>], pick: impl Fn(&Record) -> bo
             for (k, r) in data.records.iter().enumerate() {
                 if pick(r) {
                     let (a, b) = excess(r, &residual[j][data.span(k)]);
-                    sum[0] += a;
+                    sum[0] += a - data.noise[j].excess * r.count as f64;
                     sum[1] += b;
                 }
             }
@@ -101,7 +102,7 @@ pub fn joints(data: &Data, residual: &[Vec<f64>], pick: impl Fn(&Record) -> bool
             let noise = data.noise[j].std;
             JointGap {
                 joint: names[j].name.clone(),
-                rms: (sum / count - noise * noise).max(0.0).sqrt(),
+                rms: (sum / count - noise * noise * (1.0 + data.noise[j].excess)).max(0.0).sqrt(),
                 noise,
                 share: 0.0,
                 relative: (sum / torque.max(1e-300)).sqrt(),
@@ -179,4 +180,48 @@ pub fn is_odd(r: &Record) -> bool {
             .sum();
         even < 1e-4 * power
     })
+}
+
+/// Share of the gap that a function of position and velocity of each actuator could explain: bins of
+/// the state of a joint are filled from odd periods (or halves) and tried on even ones.
+pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
+    const BINS: usize = 14;
+    let (mut gap, mut left) = (0.0, 0.0);
+    for (j, e) in residual.iter().enumerate() {
+        let [lo, hi] = data.range[j];
+        let top = data.speed[j];
+        let bin = |q: f64, v: f64| -> usize {
+            let a = ((q - lo) / (hi - lo).max(1e-12) * BINS as f64) as usize;
+            // finer at low speed
+            let s = v.signum() * (v.abs() / top).min(1.0).sqrt();
+            let b = ((s + 1.0) / 2.0 * 2.0 * BINS as f64) as usize;
+            a.min(BINS - 1) * 2 * BINS + b.min(2 * BINS - 1)
+        };
+        // one record trains, the others of the fit are predicted, and the other way round
+        let mut sums = vec![[(0.0, 0.0); 2]; 2 * BINS * BINS];
+        let part = |k: usize, i: usize, r: &Record| -> usize {
+            let chunk = r.cycle.unwrap_or(r.count.div_ceil(8));
+            (i / chunk + k) % 2
+        };
+        for pass in 0..2 {
+            for (k, r) in data.records.iter().enumerate().filter(|(_, r)| r.fit) {
+                let (q, v) = r.state(j);
+                for (i, x) in e[data.span(k)].iter().enumerate() {
+                    let side = part(k, i, r);
+                    let b = bin(q[i], v[i]);
+                    if pass == 0 {
+                        sums[b][side].0 += x;
+                        sums[b][side].1 += 1.0;
+                    } else {
+                        let (sum, count) = sums[b][1 - side];
+                        let guess = sum / (count + 3.0);
+                        gap += x * x - 1.0;
+                        left += (x - guess).powi(2) - 1.0;
+                    }
+                }
+            }
+        }
+    }
+    (gap > 0.02 * (data.fitted * data.joints()) as f64)
+        .then(|| (1.0 - left / gap).clamp(0.0, 1.0))
 }

@@ -95,6 +95,8 @@ pub struct Noise {
     pub std: f64,
     /// origin
     pub source: Source,
+    /// power that unresolved acceleration adds, in units of the noise variance
+    pub excess: f64,
 }
 
 /// Flat continuation below [`SLOW`] of a spectrum of noise between periods.
@@ -138,6 +140,17 @@ impl Noise {
         Self::new(s, Source::Periods)
     }
 
+    /// No more than the robot file states: what is beyond is not noise but a gap that does not repeat.
+    pub fn limit(&mut self, stated: Option<f64>) {
+        let Some(stated) = stated.filter(|s| *s > 0.0 && self.std > 1.5 * s) else {
+            return;
+        };
+        let scale = (stated / self.std).powi(2);
+        self.torque.iter_mut().for_each(|v| *v *= scale);
+        self.std = stated;
+        self.filter = predictor(&self.torque);
+    }
+
     /// From a residual: its power above `band`, taken as flat below.
     pub fn from_residual(x: &[f64], dt: f64, band: f64) -> Self {
         let mut s = spectrum(x);
@@ -159,6 +172,7 @@ impl Noise {
             filter: Vec::new(),
             torque,
             source,
+            excess: 0.0,
         };
         noise.filter = predictor(&noise.torque);
         noise
@@ -168,6 +182,7 @@ impl Noise {
     pub fn with_excess(&mut self, excess: &[f64]) {
         let s: Vec<f64> = self.torque.iter().zip(excess).map(|(a, b)| a + b).collect();
         self.filter = predictor(&s);
+        self.excess = excess.iter().sum::<f64>() / excess.len() as f64 / self.std.powi(2);
     }
 
     /// A signal of one record, whitened; the first [`ORDER`] samples are zero.
@@ -181,6 +196,22 @@ impl Noise {
             }
             out.push(sum);
         }
+    }
+}
+
+impl Noise {
+    /// Undoes [`Noise::whiten`] of one record (but for its first samples, which are taken as zero), in
+    /// units of the noise's standard deviation.
+    pub fn unwhiten(&self, e: &[f64], out: &mut Vec<f64>) {
+        let at = out.len();
+        for i in 0..e.len() {
+            let mut sum = e[i];
+            for k in 1..self.filter.len().min(i + 1) {
+                sum -= self.filter[k] * out[at + i - k];
+            }
+            out.push(sum / self.filter[0]);
+        }
+        out[at..].iter_mut().for_each(|v| *v /= self.std);
     }
 }
 

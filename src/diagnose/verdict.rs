@@ -26,6 +26,10 @@ pub struct Rival {
     pub loss: f64,
     /// weight relative to the member
     pub weight: f64,
+    /// shape constants
+    pub shape: Vec<f64>,
+    /// coefficients
+    pub eta: Vec<f64>,
 }
 
 /// One effect of the set.
@@ -85,8 +89,13 @@ pub struct Decision {
     pub unexplained: f64,
 }
 
-/// Residual gap above which a joint is not explained: share of the rows, in noise variances.
+/// Gain that an effect must bring, per row of a joint, in noise variances.
 const LEAST: f64 = 0.06;
+/// Gap per row below which there is none: what windows, encoders and the shape of friction at
+/// reversals leave of a sound model.
+const SOUND: f64 = 0.25;
+/// Imperfection of a sound model, per row, that counts neither for nor against an effect.
+const SLACK: f64 = 0.05;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
 
@@ -106,7 +115,8 @@ impl State<'_> {
 
     /// Gap by actuator on fitted records.
     fn gap(&self, residual: &[Vec<f64>], fitted: bool) -> Vec<f64> {
-        gap::energies(self.evidence.data, residual, |r| r.fit == fitted)
+        let plain = self.evidence.unwhitened(residual);
+        gap::energies(self.evidence.data, &plain, |r| r.fit == fitted)
             .into_iter()
             .map(|[a, b]| a + b)
             .collect()
@@ -249,7 +259,7 @@ pub fn decide(
     let surprise = st.surprise(&none, &residual);
     let free = data.parameters.len() as f64;
     let total: f64 = before.iter().map(|v| v.max(0.0)).sum::<f64>();
-    let visible = before.iter().any(|v| *v > LEAST * rows);
+    let visible = before.iter().any(|v| *v > SOUND * rows);
     let surprising = surprise > SURPRISE + 2.0 * free;
     let mut set: Vec<Candidate> = Vec::new();
     // forward steps
@@ -263,6 +273,11 @@ pub fn decide(
         let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
         let mut next = st.challengers(list, &beside, 10);
         next.retain(|c| !set.iter().any(|s| s.same(c)));
+        if std::env::var("EXCITE_DEBUG").is_ok() {
+            for c in &next {
+                eprintln!("   step {} {} {:?} {:?} gain {:.0} merit {:.0}", set.len(), effects[c.effect].card().name, c.place, c.shape, c.gain, st.merit(c));
+            }
+        }
         let Some(best) = next.first().cloned() else {
             break;
         };
@@ -331,7 +346,7 @@ pub fn decide(
     let left = positive(&after) + (surprise_after - free).max(0.0);
     let unexplained = (left / (total + (surprise - free).max(0.0)).max(1e-9)).min(1.0);
     let claims = members.iter().filter(|m| m.confidence >= 0.5).count();
-    let gap_left = after.iter().any(|v| *v > LEAST * rows);
+    let gap_left = after.iter().any(|v| *v > SOUND * rows);
     let verdict = match (visible || surprising, claims) {
         (false, 0) => Verdict::NoGap,
         (_, 0) => Verdict::Unknown,
@@ -442,19 +457,28 @@ fn judge(
     let sum = |v: &[f64]| joints.iter().map(|j| v[*j].max(0.0)).sum::<f64>();
     let (w, a) = (sum(&without), sum(after));
     // of what is there without it on its joints; the least that counts is taken off
-    let slack = 0.5 * LEAST * rows * joints.len() as f64;
-    let visible = (w - a) / (w - slack).max(w * 0.2).max(1e-9);
+    let slack = SLACK * rows * joints.len() as f64;
+    let visible = ((w - a) / (w - slack).max(w * 0.3).max(1e-9)).min(1.0);
     let prior = (surprise_without - surprise_after) / (surprise_without - free).max(1.0);
     let chi_gain = gain - (surprise_without - surprise_after);
     let frozen = chi_gain < 0.5 * gain && surprise_without - surprise_after > SURPRISE;
     let share = if frozen { prior } else { visible };
     let held = data.rows() - data.fitted;
     let (hw, ha) = (sum(&st.gap(&r0, false)), sum(&st.gap(&r1, false)));
-    let hold_slack = 0.5 * LEAST * held as f64 * joints.len() as f64;
+    let hold_slack = SLACK * held as f64 * joints.len() as f64;
     let hold = if held == 0 || frozen {
         share
     } else {
-        (hw - ha) / (hw - hold_slack).max(hw * 0.2).max(1e-9)
+        ((hw - ha) / (hw - hold_slack).max(hw * 0.3).max(1e-9)).min(1.0)
+    };
+    // what it leaves on its joints, as the tests count it
+    let white: f64 = {
+        let all = gap::energies(data, &r1, |r| r.fit);
+        joints
+            .iter()
+            .map(|j| all[*j][0] + all[*j][1] + data.noise[*j].excess * rows)
+            .map(|v| v.max(0.0))
+            .sum()
     };
     // rivals in its place
     let beside: Vec<&Projected> = rest.iter().map(|c| &c.projected).collect();
@@ -464,15 +488,23 @@ fn judge(
         if r.same(c) {
             continue;
         }
-        let loss = (own - st.merit(&r)) / own.max(1e-9);
-        let scale = 0.05 + 3.0 / gain.max(1.0).sqrt();
-        let weight = (-loss / scale).exp().min(1.5);
+        // what each would leave: the member what it leaves, the rival that and what it gains less
+        let less = own - st.merit(&r);
+        let left = if frozen {
+            (surprise_after - free).max(0.0) + 12.0
+        } else {
+            white + 30.0
+        };
+        let loss = less / own.max(1e-9);
+        let weight = (left / (left + less.max(-0.5 * left))).powf(2.5).min(1.5);
         if weight > 0.02 {
             rivals.push(Rival {
                 effect: r.effect,
                 place: r.place.clone(),
                 loss,
                 weight,
+                shape: r.shape.clone(),
+                eta: r.eta.clone(),
             });
         }
     }
@@ -493,7 +525,7 @@ fn judge(
     };
     let confidence = size
         * logistic((share - 0.55) / 0.07)
-        * logistic((hold - 0.45) / 0.09)
+        * logistic((hold - 0.3) / 0.07)
         / (1.0 + against);
     let quad = |m: &faer::Mat<f64>| -> f64 {
         let e = &c.eta;

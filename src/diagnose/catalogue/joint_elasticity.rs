@@ -24,8 +24,10 @@ impl Effect for JointElasticity {
         // natural frequency of the link on its spring, damping ratio, stiffening at the peak load
         let mut all = Vec::new();
         for frequency in [5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0] {
-            for damping in [0.02, 0.1] {
-                all.push(vec![frequency, damping, 0.0]);
+            for damping in [0.02, 0.08] {
+                for cubic in [0.0, 0.5] {
+                    all.push(vec![frequency, damping, cubic]);
+                }
             }
         }
         all
@@ -76,6 +78,7 @@ impl Effect for JointElasticity {
             value("stiffness", k / eta[0], k * std[0] / (eta[0] * eta[0]), unit),
             constant("natural_frequency", shape[0], "Hz"),
             constant("damping_ratio", shape[1], ""),
+            constant("cubic_share", shape[2], ""),
         ]
     }
 }

@@ -23,8 +23,14 @@ impl Effect for Payload {
         }
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        link_inertia::body_columns(cx, cx.data.plant.robot().bodies.len() - 1, 4)
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        // a point mass, or with an inertia of its own
+        vec![vec![4.0], vec![10.0]]
+    }
+
+    fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let last = cx.data.plant.robot().bodies.len() - 1;
+        link_inertia::body_columns(cx, last, shape[0] as usize)
     }
 
     fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {

@@ -10,7 +10,7 @@ impl Effect for ThermalFriction {
         Card {
             name: "thermal_friction",
             title: "thermal friction",
-            equation: "(a sgn q̇ + b q̇) ϑ(t),  ϑ̇ = (P/P̄ − ϑ)/T",
+            equation: "(a sgn q̇ + b q̇) f(ϑ),  ϑ̇ = (P/P₀ − ϑ)/T,  f = ϑ or (1 − e^{−cϑ})/c",
             source: "Bittencourt & Gunnarsson 2012; Simoni et al. 2019",
             aliases: &[],
             separated_by: "the same period repeated cold and warm",
@@ -21,9 +21,15 @@ impl Effect for ThermalFriction {
     }
 
     fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        let times = [5.0, 15.0, 40.0, 100.0, 300.0];
-        let with = |lasts: f64| times.iter().map(move |t| vec![*t, lasts]);
-        with(1.0).chain(with(0.0)).collect()
+        // time constant, whether warmth lasts over records, how far it saturates
+        let mut all = Vec::new();
+        for time in [5.0, 15.0, 40.0, 100.0, 300.0] {
+            for bend in [0.0, 3.0, 8.0] {
+                all.push(vec![time, 1.0, bend]);
+            }
+            all.push(vec![time, 0.0, 0.0]);
+        }
+        all
     }
 
     fn refinable(&self, k: usize) -> bool {
@@ -54,7 +60,10 @@ impl Effect for ThermalFriction {
             let (_, v) = r.state(j);
             for (to, v) in warmth[cx.data.span(k)].iter_mut().zip(v) {
                 warm += r.dt / shape[0] * (power(*v) - warm);
-                *to = warm;
+                *to = match shape[2] > 0.0 {
+                    true => (1.0 - (-shape[2] * warm).exp()) / shape[2],
+                    false => warm,
+                };
             }
         }
         let times = |x: Vec<f64>| x.iter().zip(&warmth).map(|(x, w)| x * w).collect();
