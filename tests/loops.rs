@@ -398,7 +398,7 @@ fn what_cannot_be_closed_is_said_with_numbers() {
         &far,
         &[
             "cannot be closed",
-            "left_end - right_end stays open by 0.",
+            "left_end - right_end stays open by 1.",
             "m",
         ],
     );

@@ -19,6 +19,7 @@ fn joint(name: &str, motion: Motion, limits: Limits) -> Joint {
         torque_noise: None,
         position_resolution: None,
         gear_ratio: None,
+        piston: None,
         terms: [0.0; 4],
         identify: [false; 4],
     }

@@ -99,12 +99,17 @@ fn at(path: &Path, e: &std::io::Error) -> String {
 
 /// Writes the cases of a set and `truth.json` beside them.
 fn generate(set: &Set) -> Result<(), String> {
+    std::fs::create_dir_all(&set.output).map_err(|e| at(&set.output, &e))?;
     let path = set.output.join("truth.json");
     if path.exists() && !set.force {
         return Err(format!(
             "{} exists; give --force to replace the set",
             path.display()
         ));
+    }
+    // a set that is half replaced must not be scored by the answers to the old one
+    if path.exists() {
+        std::fs::remove_file(&path).map_err(|e| at(&path, &e))?;
     }
     let cases: Result<Vec<serde_json::Value>, String> = plans(set)?
         .par_iter()

@@ -48,6 +48,10 @@ pub struct Args {
     /// [default: a fifth of its root mean square]
     #[arg(long, value_name = "SPEED")]
     standstill: Option<f64>,
+    /// Pressure outside of the cylinders, Pa, for logs with chamber pressures; 0 where those are
+    /// relative to it
+    #[arg(long, value_name = "PA", default_value_t = 101_325.0)]
+    atmosphere: f64,
     /// Cut-off of the positions before they are differentiated, Hz [default: from the data]
     #[arg(long, value_name = "HZ")]
     position_cutoff: Option<f64>,
@@ -72,6 +76,12 @@ enum How {
 }
 
 pub fn run(args: Args) -> Result<()> {
+    if !(args.atmosphere >= 0.0 && args.atmosphere.is_finite()) {
+        return Err(Error::Argument(format!(
+            "--atmosphere is a pressure in Pa, not {}",
+            args.atmosphere
+        )));
+    }
     for (name, value) in [
         ("standstill", args.standstill),
         ("position-cutoff", args.position_cutoff),
@@ -97,6 +107,7 @@ pub fn run(args: Args) -> Result<()> {
         weighted: !args.unweighted,
         consistent: !args.unconstrained,
         standstill: args.standstill,
+        atmosphere: args.atmosphere,
         ..Settings::default()
     };
     settings.signals.position_cutoff = args.position_cutoff;

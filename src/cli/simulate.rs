@@ -170,6 +170,12 @@ pub fn run(args: Args) -> Result<()> {
             return Err(Error::Exists(file.clone()));
         }
     }
+    // before the work, so that nothing is lost to a folder that is not there
+    for file in [Some(&args.output), args.experiment.as_ref()].into_iter().flatten() {
+        if let Some(folder) = file.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
+        }
+    }
     if !(args.noise >= 0.0 && args.noise.is_finite()) {
         return Err(Error::Argument(format!(
             "--noise is a factor of 0 or more, not {}",

@@ -93,8 +93,8 @@ impl Prior {
             let whole = [0, 4, 7, 9].iter().all(|&k| unknowns[k].is_some());
             let name = robot.bodies[body].name.clone();
             if !whole {
-                for k in 0..10 {
-                    let Some(u) = unknowns[k].filter(|u| !taken[*u]) else {
+                for (k, unknown) in unknowns.iter().enumerate() {
+                    let Some(u) = unknown.filter(|u| !taken[*u]) else {
                         continue;
                     };
                     taken[u] = true;
@@ -187,7 +187,7 @@ impl Prior {
         }
         for t in &self.terms {
             let x = phi[t.unknown] / t.nominal;
-            if !(x > 0.0) {
+            if x.is_nan() || x <= 0.0 {
                 return f64::INFINITY;
             }
             sum += t.weight * (x - x.ln() - 1.0);
@@ -286,7 +286,7 @@ pub fn ten_of(j: &Matrix4<f64>) -> [f64; 10] {
 /// a gram.
 fn definite(mut j: Matrix4<f64>) -> (Matrix4<f64>, bool) {
     let mut changed = false;
-    if !(j[(3, 3)] > 1e-3) {
+    if j[(3, 3)].is_nan() || j[(3, 3)] <= 1e-3 {
         j[(3, 3)] = 1e-3;
         changed = true;
     }

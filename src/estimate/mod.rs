@@ -12,6 +12,7 @@
 //!    cross-validation over contiguous parts of the fit records.
 //! 5. [`validation`]: residuals on fit and holdout records.
 
+pub mod aside;
 pub mod consistent;
 pub mod essential;
 pub mod json;
@@ -218,6 +219,17 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
 
     // the method
     let first = base_estimate(plant, &base, &fit, &fit_prepared, &fit_records, settings)?;
+    // what goes with another joint is fitted aside, so that friction does not take it up
+    let (aside, notes) = aside::apart(plant, &fit, &fit_prepared, &first.pi)?;
+    warnings.extend(notes);
+    let fit: Vec<&Stack> = match &aside {
+        Some(stacks) => stacks.iter().collect(),
+        None => fit,
+    };
+    let first = match aside {
+        Some(_) => base_estimate(plant, &base, &fit, &fit_prepared, &fit_records, settings)?,
+        None => first,
+    };
     let (weights, pi, outliers) = (first.weights, first.pi, first.outliers);
     warnings.extend(first.warnings);
     let folds = linear::fold_factors(&fit, &weights, FOLDS);

@@ -71,21 +71,26 @@ pub struct Validation {
 pub struct Follower {
     /// actuator whose residual it is
     pub actuator: usize,
+    /// actuator that it goes with
+    pub other: usize,
     /// function, in words
     pub what: String,
     /// share of the residual's power on the fit records
     pub share: f64,
 }
 
+/// A function of the velocities of a joint and of another.
+type Function = fn(f64, f64) -> f64;
+
 /// Looks, joint by joint, for the function of another joint's velocity that explains most of the
 /// residual, beyond what functions of its own velocity do. The shares below a tenth are left out.
-fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
+pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
     let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
     let mut out = Vec::new();
     for a in 0..names.len() {
         let mut best: Option<Follower> = None;
         for b in (0..names.len()).filter(|b| *b != a) {
-            let functions: [(String, fn(f64, f64) -> f64); 4] = [
+            let functions: [(String, Function); 4] = [
                 (format!("the velocity of {}", names[b]), |_, y| y),
                 (format!("the direction of {}", names[b]), |_, y| {
                     if y == 0.0 { 0.0 } else { y.signum() }
@@ -133,6 +138,7 @@ fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
                 if share > 0.1 && best.as_ref().is_none_or(|f| share > f.share) {
                     best = Some(Follower {
                         actuator: a,
+                        other: b,
                         what,
                         share,
                     });
@@ -193,9 +199,10 @@ pub fn validate(
         for s in mine {
             let e = s.residual(pi);
             for (a, sum) in sums.iter_mut().enumerate() {
-                for k in a * s.count..(a + 1) * s.count {
-                    sum[0] += e[k] * e[k];
-                    sum[1] += s.measured[k] * s.measured[k];
+                let range = a * s.count..(a + 1) * s.count;
+                for (e, t) in e[range.clone()].iter().zip(&s.measured[range]) {
+                    sum[0] += e * e;
+                    sum[1] += t * t;
                     sum[2] += 1.0;
                 }
             }

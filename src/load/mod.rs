@@ -37,7 +37,7 @@ pub mod weight;
 pub use body::LoadBody;
 
 use crate::error::{Error, Result, Warning};
-use crate::log::{Experiment, Payload};
+use crate::log::{Experiment, Payload, Record};
 use crate::plant::Plant;
 use crate::signals::{self, Prepared};
 use one_step::OneStep;
@@ -79,6 +79,8 @@ pub struct Settings {
     /// mean speed of the actuators below which the two-step estimator gives no weight, rad/s or
     /// m/s; `None`: a fifth of its root mean square
     pub standstill: Option<f64>,
+    /// pressure outside of the cylinders, Pa; 0 where the logged pressures are relative to it
+    pub atmosphere: f64,
     /// preparation of the signals
     pub signals: signals::Settings,
 }
@@ -91,6 +93,7 @@ impl Default for Settings {
             weighted: true,
             consistent: true,
             standstill: None,
+            atmosphere: 101_325.0,
             signals: signals::Settings::default(),
         }
     }
@@ -148,6 +151,8 @@ pub fn identify(experiment: &Experiment, settings: &Settings) -> Result<Identifi
         .records
         .iter()
         .map(|record| {
+            let pressed = pressure_forces(record, plant, settings.atmosphere)?;
+            let record = pressed.as_ref().unwrap_or(record);
             Ok(Loaded {
                 record: Prepared::new(record, plant, &settings.signals)?,
                 payload: record.payload,
@@ -159,6 +164,41 @@ pub fn identify(experiment: &Experiment, settings: &Settings) -> Result<Identifi
     warnings.append(&mut found.warnings);
     found.warnings = warnings;
     Ok(found)
+}
+
+/// The record with forces from the chamber pressures where it has no torques:
+///
+/// ```text
+/// f = p_a A_a − p_b A_b − p_atm (A_a − A_b)
+/// ```
+///
+/// # Errors
+/// A log with pressures of a robot without piston areas.
+pub fn pressure_forces(record: &Record, plant: &Plant, atmosphere: f64) -> Result<Option<Record>> {
+    let Some([pa, pb]) = record.pressures.as_ref().filter(|_| record.tau.is_empty()) else {
+        return Ok(None);
+    };
+    let tau = plant
+        .actuators()
+        .iter()
+        .zip(pa.iter().zip(pb))
+        .map(|(joint, (a, b))| {
+            let Some([area_a, area_b]) = joint.piston else {
+                return Err(Error::Infeasible(format!(
+                    "{}: the log has chamber pressures, but `{}` no piston areas; add piston = \
+                     [AREA_A, AREA_B] in m^2 to [actuator] or to its [[joint]] in the robot file",
+                    record.name, joint.name
+                )));
+            };
+            let outside = atmosphere * (area_a - area_b);
+            let force = |(a, b): (&f64, &f64)| a * area_a - b * area_b - outside;
+            Ok(a.iter().zip(b).map(force).collect())
+        })
+        .collect::<Result<Vec<Vec<f64>>>>()?;
+    Ok(Some(Record {
+        tau,
+        ..record.clone()
+    }))
 }
 
 /// [`identify`] from signals.

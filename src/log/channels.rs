@@ -32,7 +32,7 @@ pub fn saturated(y: &[f64], effort: f64, valid: &mut [bool]) -> Option<(usize, f
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
             (a.min(x), b.max(x))
         });
-    if !(high > low) {
+    if high.is_nan() || high <= low {
         return None;
     }
     let usual = median(runs(y).map(|r| r.1 as f64));

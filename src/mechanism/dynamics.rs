@@ -163,6 +163,25 @@ impl<const N: usize> Pass for ActuationPass<'_, N> {
     }
 }
 
+/// `(AᵀA)⁻¹Aᵀ` by orthogonal triangularisation with column pivots; not numbers where the columns
+/// depend on each other.
+fn left_inverse(a: DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, columns) = a.shape();
+    let singular = DMatrix::from_element(columns, rows, f64::NAN);
+    if rows < columns {
+        return singular;
+    }
+    let qr = a.col_piv_qr();
+    let (q, r) = (qr.q(), qr.r());
+    let pivots = r.diagonal().abs();
+    let mut inverse = q.transpose();
+    if pivots.min() <= 1e-13 * pivots.max() || !r.solve_upper_triangular_mut(&mut inverse) {
+        return singular;
+    }
+    qr.p().inv_permute_rows(&mut inverse);
+    inverse
+}
+
 /// Whether every number is finite.
 fn finite(a: &[f64]) -> bool {
     a.iter().map(|x| x * 0.0).sum::<f64>() == 0.0
@@ -227,6 +246,8 @@ impl Mechanism {
         }
         self.geometry.motion(isa, x, &mut out.tree, &mut out.d);
         match (m, na) {
+            (1, 1) => self.actuation::<1>(isa, count, out),
+            (2, 2) => self.actuation::<2>(isa, count, out),
             (3, 3) => self.actuation::<3>(isa, count, out),
             (4, 4) => self.actuation::<4>(isa, count, out),
             (6, 6) => self.actuation::<6>(isa, count, out),
@@ -297,11 +318,7 @@ impl Mechanism {
             let d = DMatrix::from_fn(n, m, |i, k| out.d[(i * m + k) * count + s]);
             let da = DMatrix::from_fn(na, m, |i, k| d[(self.actuated[i], k)]);
             let a = match finite(da.as_slice()) {
-                true => {
-                    let top = da.norm();
-                    da.pseudo_inverse(1e-13 * top)
-                        .unwrap_or_else(|_| DMatrix::from_element(m, na, f64::NAN))
-                }
+                true => left_inverse(da),
                 false => DMatrix::from_element(m, na, f64::NAN),
             };
             let g = &d * &a;

@@ -145,27 +145,32 @@ impl Loops {
         Ok((setup, warnings))
     }
 
-    /// A closed configuration near the start: with the actuated joints where they are if that is
-    /// possible, else the nearest.
+    /// A closed configuration near the start: with the actuated joints where they are (with more
+    /// actuators than freedoms: as many as determine it) if that is possible, else the nearest.
     fn assemble(&self, chain: &Chain) -> Result<Vec<f64>, String> {
-        let held = |i: &usize| !self.actuated.contains(i);
-        let passive: Vec<usize> = (0..self.start.len()).filter(held).collect();
-        let all: Vec<usize> = (0..self.start.len()).collect();
         let stated = self.actuated.iter().any(|&a| self.start[a] != 0.0);
-        let first = project(chain, &self.start, &passive);
-        match first {
-            Ok(q) => Ok(q),
-            Err(why) if stated => Err(format!(
-                "the loops cannot be closed with the actuated joints where `home` and `start` put \
-                 them: {why}"
-            )),
-            Err(_) => project(chain, &self.start, &all).map_err(|why| {
-                format!(
-                    "the loops cannot be closed: {why}; check the frames, or state where the \
-                     joints are with start = {{ joint = position }}"
-                )
-            }),
+        let mut first = String::new();
+        for held in (0..=self.actuated.len()).rev() {
+            let held = &self.actuated[..held];
+            let free: Vec<usize> = (0..self.start.len())
+                .filter(|i| !held.contains(i))
+                .collect();
+            match project(chain, &self.start, &free) {
+                Ok(q) if !stated || held.len() + self.rank(chain, &q) >= q.len() => return Ok(q),
+                Ok(_) => {
+                    return Err(format!(
+                        "the loops cannot be closed with the actuated joints where `home` and \
+                         `start` put them: {first}"
+                    ));
+                }
+                Err(why) if first.is_empty() => first = why,
+                Err(_) => {}
+            }
         }
+        Err(format!(
+            "the loops cannot be closed: {first}; check the frames, or state where the joints are \
+             with start = {{ joint = position }}"
+        ))
     }
 
     /// Rank of the closures: the largest of home and some configurations nearby, so that a home in

@@ -151,6 +151,9 @@ pub struct Joint {
     pub position_resolution: Option<f64>,
     /// motor turns per joint turn
     pub gear_ratio: Option<f64>,
+    /// areas of a pneumatic or hydraulic piston, m²: of chamber a, which extends the joint, and of
+    /// chamber b
+    pub piston: Option<[f64; 2]>,
     /// values of armature, viscous, Coulomb and offset in the nominal model, in
     /// [`JointTerm::ALL`] order; always part of the torque
     pub terms: [f64; 4],
@@ -169,6 +172,7 @@ impl Joint {
             torque_noise: None,
             position_resolution: None,
             gear_ratio: None,
+            piston: None,
             terms: [0.0; 4],
             identify: [false; 4],
         }

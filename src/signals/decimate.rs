@@ -46,7 +46,7 @@ impl Decimator {
     pub fn new(cutoff: f64, rate: f64, valid: &[bool], cyclic: bool) -> Self {
         let count = valid.len();
         let fraction = cutoff / rate;
-        let all = !(fraction < 0.3) || count == 0;
+        let all = fraction.is_nan() || fraction >= 0.3 || count == 0;
         let (factor, taps) = match all {
             true => (1, vec![1.0]),
             false => {

@@ -149,7 +149,7 @@ impl Prepared {
     pub fn filtered(&self, signals: &[f64]) -> Vec<f64> {
         let (n, m) = (self.count(), self.outputs());
         assert!(
-            n > 0 && signals.len() % n == 0,
+            n > 0 && signals.len().is_multiple_of(n),
             "whole signals of {n} samples"
         );
         let mut out = vec![0.0; signals.len() / n * m];

@@ -258,7 +258,7 @@ fn check(settings: &Settings, record: &Record) -> Result<()> {
         )));
     }
     if let Some(f) = settings.cutoff
-        && !(f > 0.0)
+        && (f.is_nan() || f <= 0.0)
     {
         return Err(Error::Argument(format!(
             "a cut-off of {f} Hz: it must be positive"

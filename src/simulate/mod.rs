@@ -339,6 +339,9 @@ impl Simulator<'_> {
 
     /// Remembers the torque for the delayed sensor.
     fn remember(&mut self, t: f64, tau: &DVector<f64>) {
+        if self.history.back().is_some_and(|(last, _)| *last >= t) {
+            self.history.pop_back();
+        }
         if self.delay > 0.0 {
             self.history.push_back((t, tau.clone()));
             while self.history.len() > 2 && self.history[1].0 <= t - self.delay {

@@ -48,6 +48,7 @@ pub fn joint(name: &str, motion: Motion) -> Joint {
         torque_noise: Some(0.1),
         position_resolution: None,
         gear_ratio: None,
+        piston: None,
         terms: [0.0; 4],
         identify: [false; 4],
     }

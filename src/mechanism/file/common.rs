@@ -200,6 +200,7 @@ impl Head<'_> {
                 torque_noise: None,
                 position_resolution: None,
                 gear_ratio: None,
+                piston: None,
                 terms: [0.0; 4],
                 identify: [false; 4],
             };
@@ -249,6 +250,7 @@ impl Head<'_> {
             if let Some(j) = setup.robot.joints.iter_mut().find(|j| j.name == joint.name) {
                 j.position_resolution = joint.position_resolution;
                 j.gear_ratio = joint.gear_ratio;
+                j.piston = joint.piston;
                 // what the model has moved into a body (lumped inertia) is no column any more
                 for (own, wanted) in j.identify.iter_mut().zip(joint.identify) {
                     *own &= wanted;

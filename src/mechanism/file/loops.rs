@@ -500,6 +500,7 @@ fn split(robot: &mut Robot, joint: &str, axes: &[Vector3<f64>]) -> Result<(), St
             torque_noise: None,
             position_resolution: None,
             gear_ratio: None,
+            piston: None,
             terms: [0.0; 4],
             identify: [false; 4],
         };

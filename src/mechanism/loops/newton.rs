@@ -18,7 +18,7 @@ use crate::dynamics::lanes::Isa;
 use crate::mechanism::geometry::{Geometry, Segment};
 use crate::mechanism::scalar::{Dual, Pack, Taylor};
 use crate::mechanism::{Cone, Spread};
-use nalgebra::{DMatrix, DVector, Dyn, SVD};
+use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
 
 type Number = Pack<f64>;
 
@@ -26,7 +26,7 @@ type Number = Pack<f64>;
 const PIECE: f64 = 0.25;
 /// Most pieces between two samples.
 const PIECES: f64 = 4096.0;
-/// Relative singular value of `J_p` at which the way ends.
+/// Relative pivot of `J_p` at which the way ends.
 const HELD: f64 = 1e-8;
 
 /// The kinematics of a tree with loops.
@@ -46,9 +46,47 @@ pub(super) struct Closing {
 struct Closed {
     q: Vec<f64>,
     /// of `J_p`
-    svd: SVD<f64, Dyn, Dyn>,
+    solver: LeastSquares,
     /// `D`, coordinates × task
     d: DMatrix<f64>,
+}
+
+/// `J_p⁺` by orthogonal triangularisation with column pivots. (The singular values of nalgebra are
+/// good to 1e-8 only, which is enough to measure with but not to move with.)
+struct LeastSquares {
+    q: DMatrix<f64>,
+    r: DMatrix<f64>,
+    order: PermutationSequence<Dyn>,
+}
+
+impl LeastSquares {
+    fn new(jp: DMatrix<f64>) -> Self {
+        let qr = jp.col_piv_qr();
+        LeastSquares {
+            q: qr.q(),
+            r: qr.r(),
+            order: qr.p().clone(),
+        }
+    }
+
+    /// Smallest and largest pivot; zero where there are fewer rows than columns.
+    fn range(&self) -> (f64, f64) {
+        if self.r.nrows() < self.r.ncols() {
+            return (0.0, self.r.amax());
+        }
+        let pivots = self.r.diagonal().abs();
+        (pivots.min(), pivots.max())
+    }
+
+    /// Not numbers where it is singular.
+    fn solve(&self, b: DVector<f64>) -> DVector<f64> {
+        let mut x = self.q.tr_mul(&b);
+        match self.r.nrows() == self.r.ncols() && self.r.solve_upper_triangular_mut(&mut x) {
+            true => self.order.inv_permute_rows(&mut x),
+            false => x = DVector::from_element(self.r.ncols(), f64::NAN),
+        }
+        x
+    }
 }
 
 impl Closing {
@@ -70,39 +108,36 @@ impl Closing {
     fn closed(&self, q: Vec<f64>) -> Result<Closed, String> {
         let j = self.chain.jacobian(&q);
         let (n, m) = (q.len(), self.independent.len());
-        let jp = j.select_columns(&self.passive);
-        let svd = jp.svd(true, true);
-        let (low, high) = (svd.singular_values.min(), svd.singular_values.max());
+        let solver = LeastSquares::new(j.select_columns(&self.passive));
+        let (low, high) = solver.range();
         if !(low > HELD * high) {
             return Err(format!(
-                "the passive joints are not held there: smallest singular value of their closures \
-                 {low:.1e}, largest {high:.1e}"
+                "the passive joints are not held there: pivots of their closures from {low:.1e} \
+                 to {high:.1e}"
             ));
         }
-        let ja = j.select_columns(&self.independent);
-        let follow = svd.solve(&ja, 0.0).map_err(str::to_string)?;
+        let mut follow = Vec::new();
+        for &i in &self.independent {
+            follow.push(solver.solve(j.column(i).into_owned()));
+        }
         let mut d = DMatrix::zeros(n, m);
         for (k, &i) in self.independent.iter().enumerate() {
             d[(i, k)] = 1.0;
         }
         for (row, &i) in self.passive.iter().enumerate() {
             for k in 0..m {
-                d[(i, k)] = -follow[(row, k)];
+                d[(i, k)] = -follow[k][row];
             }
         }
-        Ok(Closed { q, svd, d })
+        Ok(Closed { q, solver, d })
     }
 
     /// `P b`.
     fn passive_part(&self, at: &Closed, b: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; at.q.len()];
-        match at.svd.solve(&DVector::from_column_slice(b), 0.0) {
-            Ok(p) => {
-                for (k, &i) in self.passive.iter().enumerate() {
-                    out[i] = -p[k];
-                }
-            }
-            Err(_) => out.fill(f64::NAN),
+        let p = at.solver.solve(DVector::from_column_slice(b));
+        for (k, &i) in self.passive.iter().enumerate() {
+            out[i] = -p[k];
         }
         out
     }

@@ -22,6 +22,7 @@ pub(crate) struct JointEntry {
     torque_noise: Option<Spanned<f64>>,
     position_resolution: Option<Spanned<f64>>,
     gear_ratio: Option<Spanned<f64>>,
+    piston: Option<Spanned<Vec<f64>>>,
     armature: Option<Spanned<f64>>,
     viscous: Option<Spanned<f64>>,
     coulomb: Option<Spanned<f64>>,
@@ -124,6 +125,19 @@ pub(crate) fn joint_values(
             ));
         }
         joint.gear_ratio = Some(value);
+    }
+    if let Some(piston) = &entry.piston {
+        joint.piston = match piston.get_ref()[..] {
+            [a, b] if a > 0.0 && b > 0.0 && a < 10.0 && b < 10.0 => Some([a, b]),
+            _ => {
+                return Err(source.error(
+                    piston.span().start,
+                    what,
+                    "piston must be two areas in m^2 (chamber a, which extends, and chamber b), as in \
+                     [1.963e-3, 1.649e-3]",
+                ));
+            }
+        };
     }
     let terms = [
         &entry.armature,

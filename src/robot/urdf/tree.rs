@@ -233,6 +233,7 @@ fn coordinate_of(
         torque_noise: None,
         position_resolution: None,
         gear_ratio: None,
+        piston: None,
         terms: [0.0, joint.damping, joint.friction, 0.0],
         identify: [false; 4],
     })

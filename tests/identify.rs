@@ -1,0 +1,517 @@
+//! Identification: exact without noise, honest with it, possible always, and right on real robots.
+
+use excite::estimate::{Consistency, Identification, Method, Settings, identify, robot};
+use excite::log::{Experiment, Payload, Purpose, Record};
+use excite::robot::JointTerm;
+use excite::{Plant, Robot};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::PI;
+use std::path::PathBuf;
+
+fn rng(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// Standard normal, by the sum of twelve.
+fn normal(r: &mut impl Rng) -> f64 {
+    (0..12).map(|_| r.random_range(-0.5..0.5)).sum()
+}
+
+/// A robot with all joint terms, and values of its parameters that are not the nominal ones.
+fn truth(name: &str, seed: u64) -> (Plant, Vec<f64>) {
+    let mut robot = Robot::load(name).unwrap().with_terms(&JointTerm::ALL);
+    let r = &mut rng(seed);
+    for joint in &mut robot.joints {
+        joint.terms = [0.1, 1.0, 0.7, 0.2].map(|x: f64| x * r.random_range(0.5..1.5));
+    }
+    let plant = Plant::Serial(robot);
+    // the same factor for all ten of a body keeps it one that can exist
+    let mut phi = plant.values();
+    let bodies = plant.robot().bodies.len();
+    for b in 0..bodies {
+        let f = r.random_range(0.8..1.25);
+        phi[10 * b..10 * (b + 1)].iter_mut().for_each(|x| *x *= f);
+    }
+    phi[10 * bodies..]
+        .iter_mut()
+        .for_each(|x| *x *= r.random_range(0.8..1.25));
+    (plant, phi)
+}
+
+/// Periods of a Fourier motion of harmonics 1 to 5 of 5 s, with the torques of `phi` and noise of
+/// AR(1) with this standard deviation; with rates where they are asked for.
+struct Run {
+    periods: usize,
+    rate: f64,
+    noise: f64,
+    memory: f64,
+    rates: bool,
+    seed: u64,
+    motion: u64,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Run {
+            periods: 2,
+            rate: 200.0,
+            noise: 0.0,
+            memory: 0.0,
+            rates: false,
+            seed: 1,
+            motion: 11,
+        }
+    }
+}
+
+fn record(plant: &Plant, phi: &[f64], purpose: Purpose, run: &Run) -> Record {
+    let period = 5.0;
+    let (n, each) = (plant.coordinates(), (period * run.rate) as usize);
+    let count = each * run.periods;
+    let r = &mut rng(run.motion);
+    let mut x = excite::dynamics::Samples::zeros(n, each);
+    for j in 0..n {
+        let [low, high] = plant.robot().joints[j].limits.position;
+        let half = if (high - low).is_finite() {
+            (0.2 * (high - low)).min(0.8)
+        } else {
+            0.8
+        };
+        let middle = if (high - low).is_finite() {
+            0.5 * (low + high)
+        } else {
+            0.0
+        };
+        let waves: Vec<(f64, f64, f64)> = (1..=5)
+            .map(|h| {
+                (
+                    f64::from(h) * 2.0 * PI / period,
+                    half * r.random_range(0.1..0.4),
+                    r.random_range(0.0..6.28),
+                )
+            })
+            .collect();
+        for i in 0..each {
+            let t = i as f64 / run.rate;
+            let at = j * each + i;
+            x.q[at] = middle
+                + waves
+                    .iter()
+                    .map(|(w, a, p)| a * (w * t + p).sin())
+                    .sum::<f64>();
+            x.qd[at] = waves
+                .iter()
+                .map(|(w, a, p)| a * w * (w * t + p).cos())
+                .sum();
+            x.qdd[at] = waves
+                .iter()
+                .map(|(w, a, p)| -a * w * w * (w * t + p).sin())
+                .sum();
+        }
+    }
+    let tau = plant.torque(&x, phi).unwrap();
+    let rows = |list: &[f64]| -> Vec<Vec<f64>> {
+        list.chunks_exact(each)
+            .map(|row| row.iter().cycle().take(count).copied().collect())
+            .collect()
+    };
+    let mut tau = rows(&tau);
+    let r = &mut rng(run.seed);
+    if run.noise > 0.0 {
+        for row in &mut tau {
+            let mut e = 0.0;
+            for v in row.iter_mut() {
+                e = run.memory * e + (1.0 - run.memory * run.memory).sqrt() * normal(r);
+                *v += run.noise * e;
+            }
+        }
+    }
+    Record {
+        name: format!("{purpose:?}").to_lowercase(),
+        path: PathBuf::from("made.csv"),
+        purpose,
+        period: Some(period),
+        payload: Payload::None,
+        step: 1.0 / run.rate,
+        t: (0..count).map(|i| i as f64 / run.rate).collect(),
+        valid: vec![true; count],
+        qref: Some(rows(&x.q)),
+        q: rows(&x.q),
+        tau,
+        dq: run.rates.then(|| rows(&x.qd)),
+        ddq: run.rates.then(|| rows(&x.qdd)),
+        ql: None,
+        pose: None,
+        pressures: None,
+        resampled: false,
+        warnings: Vec::new(),
+    }
+}
+
+fn worst(id: &Identification, phi: &[f64], pi: &[f64]) -> f64 {
+    let exact = id.base.project(phi);
+    let size = exact.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    exact
+        .iter()
+        .zip(pi)
+        .map(|(a, b)| (a - b).abs() / a.abs().max(1e-3 * size))
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
+    for name in excite::robot::bundled::names() {
+        let plant = Plant::load(name).unwrap();
+        if plant.mechanism().is_some() {
+            continue;
+        }
+        let (plant, phi) = truth(name, 3);
+        // positions alone (periods, frequency domain), and with the rates (as they stand)
+        for rates in [false, true] {
+            let r = record(
+                &plant,
+                &phi,
+                Purpose::Fit,
+                &Run {
+                    rates,
+                    periods: if rates { 1 } else { 2 },
+                    ..Run::default()
+                },
+            );
+            let settings = Settings {
+                prior_strength: Some(1e-2),
+                ..Settings::default()
+            };
+            let id = identify(&plant, &[r], &settings).unwrap();
+            let e = worst(&id, &phi, &id.pi);
+            assert!(e < 1e-8, "{name}, rates {rates}: {e:.2e}");
+            assert!(id.consistent, "{name}");
+            let e = worst(&id, &phi, &id.pi_consistent);
+            assert!(e < 1e-3, "{name}, consistent: {e:.2e}");
+        }
+    }
+}
+
+/// 95 % intervals hold the truth in 95 % of the runs, with white noise and with correlated noise.
+#[test]
+fn intervals_cover() {
+    for memory in [0.0, 0.95] {
+        let (plant, phi) = truth("planar2", 5);
+        let (mut inside, mut total) = (0, 0);
+        for seed in 0..80 {
+            let run = Run {
+                noise: 0.3,
+                memory,
+                seed: 100 + seed,
+                periods: 1,
+                rate: 400.0,
+                ..Run::default()
+            };
+            let mut r = record(&plant, &phi, Purpose::Fit, &run);
+            // exact rates, so that only the torque is noisy
+            r.period = None;
+            let exact = record(&plant, &phi, Purpose::Fit, &Run { rates: true, ..run });
+            (r.dq, r.ddq) = (exact.dq, exact.ddq);
+            let settings = Settings {
+                prior_strength: Some(1.0),
+                ..Settings::default()
+            };
+            let id = identify(&plant, &[r], &settings).unwrap();
+            for ((x, s), exact) in id.pi.iter().zip(&id.std).zip(id.base.project(&phi)) {
+                inside += usize::from((x - exact).abs() <= 1.96 * s);
+                total += 1;
+            }
+        }
+        let share = f64::from(inside as u32) / f64::from(total as u32);
+        println!(
+            "memory {memory}: {:.1} % of {total} intervals hold the truth",
+            100.0 * share
+        );
+        assert!((0.90..0.985).contains(&share), "memory {memory}: {share}");
+    }
+}
+
+#[test]
+fn all_methods_agree_where_they_should() {
+    let (plant, phi) = truth("planar2", 9);
+    let run = Run {
+        noise: 0.2,
+        periods: 5,
+        ..Run::default()
+    };
+    let fit = record(&plant, &phi, Purpose::Fit, &run);
+    let holdout = record(
+        &plant,
+        &phi,
+        Purpose::Holdout,
+        &Run {
+            motion: 12,
+            noise: 0.0,
+            ..run
+        },
+    );
+    for method in [
+        Method::Ols,
+        Method::Wls,
+        Method::Robust,
+        Method::Ml,
+        Method::Iv,
+    ] {
+        let settings = Settings {
+            method,
+            ..Settings::default()
+        };
+        let id = identify(&plant, &[fit.clone(), holdout.clone()], &settings).unwrap();
+        let far = id
+            .pi
+            .iter()
+            .zip(id.base.project(&phi))
+            .zip(&id.std)
+            .map(|((x, y), s)| (x - y).abs() / s)
+            .fold(0.0, f64::max);
+        assert!(far < 5.0, "{method:?}: {far}");
+        assert!(
+            id.validation.holdout.as_ref().unwrap().relative_error < 0.02,
+            "{method:?}"
+        );
+        assert!(id.consistent);
+    }
+    // without periods there is no scatter, without command no instruments
+    let mut bare = fit.clone();
+    (bare.period, bare.qref) = (None, None);
+    for (method, word) in [(Method::Ml, "period"), (Method::Iv, "qref1")] {
+        let settings = Settings {
+            method,
+            ..Settings::default()
+        };
+        let e = identify(&plant, &[bare.clone()], &settings)
+            .unwrap_err()
+            .to_string();
+        assert!(e.contains(word), "{e}");
+    }
+}
+
+#[test]
+fn outliers_do_not_move_the_robust_estimate() {
+    let (plant, phi) = truth("planar2", 9);
+    let mut r = record(
+        &plant,
+        &phi,
+        Purpose::Fit,
+        &Run {
+            noise: 0.05,
+            rates: true,
+            periods: 1,
+            ..Run::default()
+        },
+    );
+    r.period = None;
+    let n = r.len();
+    for k in (0..n).filter(|k| (k / 40) % 9 == 4) {
+        r.tau[0][k] += 30.0;
+    }
+    let error = |method: Method| {
+        let settings = Settings {
+            method,
+            prior_strength: Some(1.0),
+            ..Settings::default()
+        };
+        let id = identify(&plant, &[r.clone()], &settings).unwrap();
+        worst(&id, &phi, &id.pi)
+    };
+    let (plain, robust) = (error(Method::Wls), error(Method::Robust));
+    assert!(robust < 0.2 * plain, "{robust} {plain}");
+}
+
+#[test]
+fn bodies_stay_possible_when_the_data_are_poor() {
+    let (plant, phi) = truth("panda", 4);
+    let run = Run {
+        noise: 20.0,
+        periods: 1,
+        rate: 100.0,
+        rates: true,
+        ..Run::default()
+    };
+    let r = record(&plant, &phi, Purpose::Fit, &run);
+    for consistency in [Consistency::Entropic, Consistency::Lmi] {
+        let settings = Settings {
+            consistency,
+            prior_strength: Some(1.0),
+            ..Settings::default()
+        };
+        let id = identify(&plant, &[r.clone()], &settings).unwrap();
+        assert!(id.consistent, "{consistency:?} {:?}", id.margin);
+        let robot = robot::with_values(&plant, &id.phi);
+        for b in &robot.bodies {
+            let (smallest, violated) = b.inertia.realizability();
+            assert!(
+                smallest > 0.0 && violated < 1e-9,
+                "{}: {smallest} {violated}",
+                b.name
+            );
+        }
+        for j in &robot.joints {
+            assert!(
+                j.terms[..3].iter().all(|x| *x >= -1e-9),
+                "{}: {:?}",
+                j.name,
+                j.terms
+            );
+        }
+    }
+    let free = Settings {
+        consistency: Consistency::Free,
+        ..Settings::default()
+    };
+    assert!(
+        !identify(&plant, &[r], &free).unwrap().consistent,
+        "this noise makes impossible bodies"
+    );
+}
+
+#[test]
+fn what_the_motion_does_not_show_is_named() {
+    let (plant, phi) = truth("planar2", 4);
+    let mut r = record(
+        &plant,
+        &phi,
+        Purpose::Fit,
+        &Run {
+            rates: true,
+            periods: 1,
+            ..Run::default()
+        },
+    );
+    r.period = None;
+    // joint 1 stands still: its armature, viscous and Coulomb friction have no effect
+    let n = r.len();
+    r.q[0] = vec![0.3; n];
+    r.dq.as_mut().unwrap()[0] = vec![0.0; n];
+    r.ddq.as_mut().unwrap()[0] = vec![0.0; n];
+    let x = excite::dynamics::Samples {
+        dof: 2,
+        count: n,
+        q: r.q.concat(),
+        qd: r.dq.as_ref().unwrap().concat(),
+        qdd: r.ddq.as_ref().unwrap().concat(),
+    };
+    let tau = plant.torque(&x, &phi).unwrap();
+    r.tau = tau.chunks_exact(n).map(<[f64]>::to_vec).collect();
+    let id = identify(
+        &plant,
+        &[r],
+        &Settings {
+            prior_strength: Some(1.0),
+            ..Settings::default()
+        },
+    )
+    .unwrap();
+    let text: Vec<String> = id.warnings.iter().map(ToString::to_string).collect();
+    let name = format!("{}.viscous", plant.robot().joints[0].name);
+    assert!(
+        text.iter()
+            .any(|t| t.contains("says nothing") && t.contains(&name)),
+        "{text:#?}"
+    );
+    assert!(id.phi.iter().all(|x| x.is_finite()) && id.consistent);
+}
+
+#[test]
+fn torques_in_other_units_are_suspected() {
+    let (plant, phi) = truth("planar2", 4);
+    let mut r = record(&plant, &phi, Purpose::Fit, &Run::default());
+    r.tau[1].iter_mut().for_each(|x| *x *= -1.0);
+    r.tau[0].iter_mut().for_each(|x| *x *= 0.01);
+    let id = identify(&plant, &[r], &Settings::default()).unwrap();
+    let text: Vec<String> = id.warnings.iter().map(ToString::to_string).collect();
+    assert!(text.iter().any(|t| t.contains("opposite")), "{text:#?}");
+    assert!(
+        text.iter().any(|t| t.contains("times the model's")),
+        "{text:#?}"
+    );
+}
+
+fn shared(name: &str) -> Option<Experiment> {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let from_env = std::env::var_os("EXCITE_SHARED").map(PathBuf::from);
+    let places = [root.join("../shared"), root.join("../../shared")];
+    let path = from_env
+        .into_iter()
+        .chain(places)
+        .map(|p| p.join("data").join(name).join("experiment.toml"))
+        .find(|p| p.is_file());
+    if path.is_none() {
+        println!("skipped: the recordings of {name} are not here");
+    }
+    path.map(|p| Experiment::read(p).unwrap())
+}
+
+#[test]
+fn emps_gives_the_published_values() {
+    let Some(e) = shared("emps") else { return };
+    // a strength at which the prior, which holds the published values, does nothing
+    let settings = Settings {
+        prior_strength: Some(1e-2),
+        ..Settings::default()
+    };
+    let id = identify(&e.plant, &e.records, &settings).unwrap();
+    for (name, value) in [
+        ("carriage.m", 95.1),
+        ("slide.viscous", 203.5),
+        ("slide.coulomb", 20.4),
+        ("slide.offset", -3.16),
+    ] {
+        let k = (0..id.base.count())
+            .find(|&k| id.base.name(k) == name)
+            .unwrap();
+        for x in [id.pi[k], id.pi_consistent[k]] {
+            assert!((x / value - 1.0).abs() < 0.01, "{name}: {x}");
+        }
+    }
+    let v = &id.validation;
+    println!(
+        "emps: fit {:.4}, holdout {:?}",
+        v.fit.relative_error, v.plain.1
+    );
+    assert!(v.fit.relative_error < 0.0408 && v.plain.1.unwrap() < 0.046);
+}
+
+#[test]
+fn panda_predicts_its_second_half() {
+    let Some(e) = shared("panda") else { return };
+    let Plant::Serial(robot) = e.plant else {
+        panic!()
+    };
+    let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
+    let plant = Plant::Serial(robot.with_terms(&terms));
+    let id = identify(&plant, &e.records, &Settings::default()).unwrap();
+    let h = id.validation.holdout.as_ref().unwrap().relative_error;
+    println!(
+        "panda: fit {:.4} holdout {h:.4}, plain {:?}",
+        id.validation.fit.relative_error, id.validation.plain
+    );
+    assert!(h < 0.015 && id.consistent);
+}
+
+#[test]
+fn tx40_is_better_than_plain_least_squares_and_says_what_is_left() {
+    let Some(e) = shared("tx40") else { return };
+    let id = identify(&e.plant, &e.records, &Settings::default()).unwrap();
+    let v = &id.validation;
+    let h = v.holdout.as_ref().unwrap().relative_error;
+    println!(
+        "tx40: fit {:.4} holdout {h:.4}, plain {:?}, {:?}",
+        v.fit.relative_error, v.plain, v.followers
+    );
+    assert!(h < 0.155 && id.consistent);
+    // the coupled wrist: the residual of axis 5 goes with axis 6
+    assert!(
+        v.followers
+            .iter()
+            .any(|f| f.actuator == 4 && f.what.contains("joint_6")),
+        "{:?}",
+        v.followers
+    );
+}

@@ -1,0 +1,549 @@
+//! Loads from logs of the drives: exact where there is no noise, within the stated bounds with
+//! residual friction and noise.
+
+mod common;
+
+use excite::dynamics::Samples;
+use excite::load::body::{from_quantities, quantities};
+use excite::load::two_step::PlatformSample;
+use excite::load::{Identified, Loaded, Parameters, Settings, from_records};
+use excite::log::{Payload, Purpose};
+use excite::plant::Plant;
+use excite::robot::Inertia;
+use excite::signals::{Decimator, Prepared};
+use nalgebra::{Matrix3, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+
+/// The load of Schulte & Gerland's experiment with a made-up centre and tensor.
+const LOAD: [f64; 10] = [
+    22.26, 0.03, -0.02, 0.12, 0.26, 0.012, -0.02, 0.29, 0.015, 0.33,
+];
+
+fn normal(r: &mut ChaCha8Rng) -> f64 {
+    let u: f64 = 1.0 - r.random::<f64>();
+    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * r.random::<f64>()).cos()
+}
+
+/// Sums of sines of several frequencies in every coordinate.
+fn multisine(plant: &Plant, count: usize, rate: f64, harmonics: &[f64], seed: u64) -> Samples {
+    let mut r = ChaCha8Rng::seed_from_u64(seed);
+    let n = plant.coordinates();
+    let period = count as f64 / rate;
+    let mut s = Samples::zeros(n, count);
+    for j in 0..n {
+        let (middle, half) = match plant.mechanism() {
+            Some(m) => {
+                let p = m.workspace[j].position;
+                (m.home[j], 0.45 * (p[1] - p[0]))
+            }
+            None => (if j == 1 || j == 3 { -1.0 } else { 0.3 }, 0.8),
+        };
+        s.q[j * count..(j + 1) * count].fill(middle);
+        for &h in harmonics {
+            let a = half / harmonics.len() as f64 * r.random_range(0.6..1.0);
+            let phase = r.random_range(0.0..std::f64::consts::TAU);
+            let w = std::f64::consts::TAU * h / period;
+            for i in 0..count {
+                let angle = w * i as f64 / rate + phase;
+                s.q[j * count + i] += a * angle.sin();
+                s.qd[j * count + i] += a * w * angle.cos();
+                s.qdd[j * count + i] -= a * w * w * angle.sin();
+            }
+        }
+    }
+    s
+}
+
+/// Signals as they come out of the preparation, without any filter.
+fn prepared(name: &str, x: &Samples, torque: Vec<f64>, rate: f64) -> Prepared {
+    let count = x.count;
+    let valid = vec![true; count];
+    Prepared {
+        name: name.into(),
+        purpose: Purpose::Fit,
+        rate,
+        time: (0..count).map(|i| i as f64 / rate).collect(),
+        motion: x.clone(),
+        actuators: torque.len() / count,
+        torque,
+        filter: Decimator::new(f64::INFINITY, rate, &valid, true),
+        valid,
+        periods: None,
+        position_cutoff: vec![f64::INFINITY; x.dof],
+        cutoff_reason: String::new(),
+        warnings: Vec::new(),
+    }
+}
+
+/// Torque of the plant with a load, and with other friction and noise.
+struct Truth {
+    load: Option<Inertia>,
+    stribeck: f64,
+    noise: f64,
+    friction: [f64; 3],
+    gain: Vec<f64>,
+}
+
+impl Default for Truth {
+    fn default() -> Self {
+        Truth {
+            load: None,
+            stribeck: 0.0,
+            noise: 0.0,
+            friction: [3.0, 4.0, 0.5],
+            gain: Vec::new(),
+        }
+    }
+}
+
+fn torque(plant: &Plant, x: &Samples, truth: &Truth, seed: u64) -> Vec<f64> {
+    let mut r = ChaCha8Rng::seed_from_u64(seed);
+    let mut tau = plant.nominal_torque(x).unwrap();
+    let tool = excite::simulate::effects::tool_body(plant).unwrap();
+    if let Some(load) = truth.load {
+        let w = excite::load::system::tool_columns(plant, tool, x).unwrap();
+        for (i, t) in tau.iter_mut().enumerate() {
+            *t += (0..10).map(|k| w[(i, k)] * load.0[k]).sum::<f64>();
+        }
+    }
+    let moved = plant.actuator_motion(x).unwrap();
+    for a in 0..moved.dof {
+        for i in 0..x.count {
+            let v = moved.qd[a * x.count + i];
+            let [c, f, o] = truth.friction;
+            let peak = truth.stribeck * (-(v / 0.01).powi(2)).exp();
+            let t = &mut tau[a * x.count + i];
+            *t += (c + peak) * v.signum() + f * v + o + truth.noise * normal(&mut r);
+            *t *= truth.gain.get(a).copied().unwrap_or(1.0);
+        }
+    }
+    tau
+}
+
+fn loaded(record: Prepared, payload: Payload) -> Loaded {
+    Loaded { record, payload }
+}
+
+/// Errors as the targets are stated: mass in percent, centre in mm, tensor in percent of
+/// `√(I_ii I_jj)`.
+fn errors(found: &[f64; 10], truth: &[f64; 10]) -> [f64; 10] {
+    let size = |a: usize, b: usize| (truth[a] * truth[b]).sqrt();
+    let scale = [
+        truth[0] / 100.0,
+        1e-3,
+        1e-3,
+        1e-3,
+        size(4, 4) / 100.0,
+        size(4, 7) / 100.0,
+        size(4, 9) / 100.0,
+        size(7, 7) / 100.0,
+        size(7, 9) / 100.0,
+        size(9, 9) / 100.0,
+    ];
+    std::array::from_fn(|i| (found[i] - truth[i]) / scale[i])
+}
+
+fn worst(e: &[f64]) -> f64 {
+    e.iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+fn hexapod(truth: &Truth, rate: f64, count: usize, seed: u64, settings: &Settings) -> Identified {
+    let plant = Plant::load("hexapod").unwrap();
+    // 0.3 to 1.5 Hz in a period of 10 s
+    let base = count as f64 / rate / 10.0;
+    let x = multisine(
+        &plant,
+        count,
+        rate,
+        &[3.0, 7.0, 11.0, 15.0].map(|h| h * base),
+        seed,
+    );
+    let empty = Truth {
+        load: None,
+        gain: truth.gain.clone(),
+        ..*truth
+    };
+    let records = vec![
+        loaded(
+            prepared("empty", &x, torque(&plant, &x, &empty, seed + 1000), rate),
+            Payload::None,
+        ),
+        loaded(
+            prepared("loaded", &x, torque(&plant, &x, truth, seed + 2000), rate),
+            Payload::Unknown,
+        ),
+    ];
+    from_records(&plant, records, settings).unwrap()
+}
+
+#[test]
+fn the_published_equations_hold_for_the_reference_samples() {
+    let Some(folder) = common::parallel::checks() else {
+        println!("reference folder absent: skipped");
+        return;
+    };
+    let text = std::fs::read_to_string(folder.join("load_two_step.json")).unwrap();
+    let all: Value = serde_json::from_str(&text).unwrap();
+    let text = std::fs::read_to_string(folder.join("sg_model.json")).unwrap();
+    let model: Value = serde_json::from_str(&text).unwrap();
+    let gravity = Vector3::new(0.0, 0.0, -9.81);
+    for name in ["single", "multi"] {
+        let case = &all["exact"][name];
+        let s = &case["sample"];
+        let vector = |v: &Value| common::parallel::vector(v);
+        let f = common::parallel::numbers(&s["f"]);
+        let force: Vector3<f64> = (0..6).map(|j| vector(&s["s"][j]) * f[j]).sum();
+        let rotation = common::parallel::matrix(&s["R"]);
+        let moment: Vector3<f64> = (0..6)
+            .map(|j| {
+                let arm = rotation * vector(&model["legs"][j]["b"]);
+                arm.cross(&(vector(&s["s"][j]) * f[j]))
+            })
+            .sum();
+        let sample = PlatformSample {
+            rotation,
+            omega: vector(&s["w_L"]),
+            alpha: vector(&s["wd_L"]),
+            acceleration: vector(&s["a_P"]),
+            force,
+            moment,
+            weight: 1.0,
+        };
+        let (phi, y) = sample.newton(&gravity);
+        let r = vector(&case["r"]);
+        let theta = nalgebra::Vector4::new(1.0 / case["m"].as_f64().unwrap(), r.x, r.y, r.z);
+        assert!(
+            (phi * theta - y).norm() < 1e-10,
+            "{name}: {}",
+            phi * theta - y
+        );
+        let jc = common::parallel::numbers(&case["JC"]);
+        let (phi, y) = sample.euler(&r);
+        let tensor = nalgebra::Vector6::from_column_slice(&jc);
+        assert!((phi * tensor - y).norm() < 1e-10, "{name}");
+        // total minus platform is the load, as the file states it
+        let mut v = [0.0; 10];
+        v[0] = case["m"].as_f64().unwrap();
+        v[1..4].copy_from_slice(r.as_slice());
+        v[4..].copy_from_slice(&jc);
+        let total = from_quantities(&v);
+        let back = quantities(&total);
+        assert!(worst(&errors(&back, &v)) < 1e-9);
+        let load = case["load_r"].as_array().unwrap();
+        let lj = common::parallel::matrix(&case["load_JC"]);
+        let load = Inertia::from_com(
+            case["load_m"].as_f64().unwrap(),
+            Vector3::from_iterator(load.iter().map(|x| x.as_f64().unwrap())),
+            lj,
+        );
+        assert!(worst(&errors(&quantities(&load), &LOAD)) < 1e-8);
+        // and the rest is a platform of 30 kg that can exist
+        let platform = excite::load::body::difference(&total, &load);
+        assert!((platform.mass() - 30.0).abs() < 1e-9);
+        assert!(platform.realizability().0 > 0.0);
+    }
+}
+
+#[test]
+fn both_methods_are_exact_without_noise() {
+    let truth = Truth {
+        load: Some(from_quantities(&LOAD)),
+        ..Truth::default()
+    };
+    let found = hexapod(&truth, 100.0, 500, 3, &Settings::default());
+    let one = errors(&found.one_step.load.values(), &LOAD);
+    let two = errors(&found.two_step.as_ref().unwrap().load.values(), &LOAD);
+    println!(
+        "one step {:.1e}, two steps {:.1e}",
+        worst(&one),
+        worst(&two)
+    );
+    // in percent and millimetres: 1e-10 of the quantities
+    assert!(worst(&one) < 1e-8, "{one:?}");
+    assert!(worst(&two) < 1e-7, "{two:?}");
+    let friction = &found.one_step.records[1].friction[0];
+    assert!((friction.coulomb - 28.0).abs() < 1e-8, "{friction:?}");
+    // from the nominal platform alone
+    let plant = Plant::load("hexapod").unwrap();
+    let x = multisine(&plant, 500, 100.0, &[2.0, 5.0, 7.0], 8);
+    let only = vec![loaded(
+        prepared("loaded", &x, torque(&plant, &x, &truth, 1), 100.0),
+        Payload::Unknown,
+    )];
+    let found = from_records(&plant, only, &Settings::default()).unwrap();
+    assert!(worst(&errors(&found.load().values(), &LOAD)) < 1e-8);
+    assert!(found.warnings.iter().any(|w| w.message.contains("nominal")));
+}
+
+#[test]
+fn stribeck_friction_and_noise_stay_within_the_targets() {
+    let truth = Truth {
+        load: Some(from_quantities(&LOAD)),
+        stribeck: 15.0,
+        // 2 N at 200 Hz, mean of four periods
+        noise: 1.0,
+        ..Truth::default()
+    };
+    let (mut one, mut plain, mut two) = ([0.0f64; 3], [0.0f64; 3], [0.0f64; 3]);
+    for seed in 0..5 {
+        let found = hexapod(&truth, 200.0, 2000, seed, &Settings::default());
+        let even = Settings {
+            weighted: false,
+            ..Settings::default()
+        };
+        let unweighted = hexapod(&truth, 200.0, 2000, seed, &even);
+        let add = |to: &mut [f64; 3], v: &[f64; 10]| {
+            let e = errors(v, &LOAD);
+            to[0] = to[0].max(e[0].abs());
+            to[1] = to[1].max(worst(&e[1..4]));
+            to[2] = to[2].max(worst(&e[4..]));
+        };
+        add(&mut one, &found.one_step.load.values());
+        add(&mut plain, &unweighted.one_step.load.values());
+        add(&mut two, &found.two_step.as_ref().unwrap().load.values());
+    }
+    println!("worst of 5: mass %, centre mm, inertia %");
+    println!("one step            {one:.3?}");
+    println!("one step unweighted {plain:.3?}");
+    println!("two steps           {two:.3?}");
+    assert!(one[0] < 0.1 && one[1] < 0.3 && one[2] < 1.5, "{one:?}");
+    assert!(two[2] > one[2] && two[1] > one[1]);
+}
+
+#[test]
+fn stated_deviations_cover_the_errors() {
+    let truth = Truth {
+        load: Some(from_quantities(&LOAD)),
+        noise: 2.0,
+        ..Truth::default()
+    };
+    let (mut inside, mut all) = (0, 0);
+    for seed in 20..35 {
+        let found = hexapod(&truth, 100.0, 500, seed, &Settings::default());
+        let body = &found.one_step.load;
+        let (v, s) = (body.values(), body.stds());
+        for k in 0..10 {
+            all += 1;
+            inside += usize::from((v[k] - LOAD[k]).abs() < 1.96 * s[k]);
+        }
+    }
+    let coverage = inside as f64 / all as f64;
+    println!("coverage of 95 %: {coverage:.3}");
+    assert!((0.88..1.0).contains(&coverage), "{coverage}");
+}
+
+#[test]
+fn payload_of_a_serial_robot() {
+    let plant = Plant::load("ur10e").unwrap();
+    let load = from_quantities(&[
+        4.2, 0.02, -0.03, 0.08, 0.02, 0.001, -0.002, 0.025, 0.0015, 0.018,
+    ]);
+    let truth = Truth {
+        load: Some(load),
+        ..Truth::default()
+    };
+    // other motions with and without the load
+    let x = multisine(&plant, 600, 100.0, &[1.0, 2.0, 3.0, 4.0], 1);
+    let z = multisine(&plant, 600, 100.0, &[1.0, 2.0, 3.0, 5.0], 2);
+    let records = || {
+        vec![
+            loaded(
+                prepared("empty", &x, torque(&plant, &x, &Truth::default(), 1), 100.0),
+                Payload::None,
+            ),
+            loaded(
+                prepared("loaded", &z, torque(&plant, &z, &truth, 2), 100.0),
+                Payload::Unknown,
+            ),
+        ]
+    };
+    let found = from_records(&plant, records(), &Settings::default()).unwrap();
+    let e = errors(&found.load().values(), &quantities(&load));
+    assert!(worst(&e) < 1e-5, "{e:?}");
+    assert!(found.two_step.is_none() && !found.no_two_step.is_empty());
+    // mass and centre of mass of a point mass
+    let point = Inertia::from_com(3.0, Vector3::new(0.01, 0.02, 0.1), Matrix3::zeros());
+    let truth = Truth {
+        load: Some(point),
+        ..Truth::default()
+    };
+    let only = vec![loaded(
+        prepared("loaded", &z, torque(&plant, &z, &truth, 2), 100.0),
+        Payload::Unknown,
+    )];
+    let settings = Settings {
+        parameters: Parameters::MassCom,
+        ..Settings::default()
+    };
+    let found = from_records(&plant, only, &settings).unwrap();
+    let v = found.load().values();
+    assert!(
+        (v[0] - 3.0).abs() < 1e-8 && (v[3] - 0.1).abs() < 1e-8,
+        "{v:?}"
+    );
+    let json = excite::load::report::json(&found);
+    assert!(json["inertia_com"]["value"][0].is_null() && json["mass"]["value"].is_number());
+}
+
+#[test]
+fn a_known_load_tells_the_drive_gains() {
+    let plant = Plant::load("ur10e").unwrap();
+    let known = [6.0, 0.0, 0.02, 0.1, 0.03, 0.0, 0.0, 0.03, 0.0, 0.02];
+    let unknown = [4.0, 0.03, 0.0, 0.07, 0.02, 0.0, 0.0, 0.02, 0.0, 0.015];
+    let truth = |load: Option<[f64; 10]>| Truth {
+        load: load.map(|l| from_quantities(&l)),
+        noise: 0.05,
+        gain: vec![1.0, 1.06, 1.0, 1.0, 1.0, 1.0],
+        ..Truth::default()
+    };
+    let x = multisine(&plant, 1500, 100.0, &[1.0, 2.0, 3.0, 4.0], 1);
+    let record = |name: &str, load: Option<[f64; 10]>, seed| {
+        prepared(name, &x, torque(&plant, &x, &truth(load), seed), 100.0)
+    };
+    let payload = Payload::Known {
+        mass: known[0],
+        com: [known[1], known[2], known[3]],
+        inertia: Some(std::array::from_fn(|k| known[4 + k])),
+    };
+    let records = vec![
+        loaded(record("empty", None, 1), Payload::None),
+        loaded(record("known", Some(known), 2), payload),
+        loaded(record("unknown", Some(unknown), 3), Payload::Unknown),
+    ];
+    let found = from_records(&plant, records, &Settings::default()).unwrap();
+    let gain = found.gain.as_ref().unwrap();
+    println!("{gain:?}");
+    assert!(gain.corrected[1] && (gain.value[1] - 1.06).abs() < 0.02);
+    assert!(gain.corrected.iter().filter(|c| **c).count() == 1);
+    let v = found.load().values();
+    assert!((v[0] - 4.0).abs() < 0.05, "{v:?}");
+}
+
+#[test]
+fn a_load_that_cannot_exist_is_moved_to_one_that_can() {
+    // a thin rod whose estimate is drowned in noise
+    let thin = [1.5, 0.0, 0.0, 0.02, 1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-6];
+    let truth = Truth {
+        load: Some(from_quantities(&thin)),
+        noise: 4.0,
+        ..Truth::default()
+    };
+    let free = Settings {
+        consistent: false,
+        ..Settings::default()
+    };
+    let mut moved = 0;
+    for seed in 0..6 {
+        let raw = hexapod(&truth, 100.0, 300, seed, &free);
+        let found = hexapod(&truth, 100.0, 300, seed, &Settings::default());
+        let body = &found.one_step.load;
+        assert!(body.inertia.realizability().0 > -1e-5, "{:?}", body.inertia);
+        if body.projected {
+            moved += 1;
+            assert!(!raw.one_step.load.consistent && !raw.one_step.load.projected);
+            assert!((body.inertia.mass() - raw.one_step.load.inertia.mass()).abs() < 0.5);
+        }
+    }
+    assert!(moved >= 2, "{moved}");
+}
+
+#[test]
+fn robots_with_few_axes_say_what_they_cannot_tell() {
+    let plant = Plant::load("planar2").unwrap();
+    let x = multisine(&plant, 400, 100.0, &[1.0, 2.0, 3.0], 1);
+    let truth = Truth {
+        load: Some(from_quantities(&[
+            1.0, 0.05, 0.02, 0.0, 0.01, 0.0, 0.0, 0.01, 0.0, 0.01,
+        ])),
+        ..Truth::default()
+    };
+    let records = vec![loaded(
+        prepared("loaded", &x, torque(&plant, &x, &truth, 1), 100.0),
+        Payload::Unknown,
+    )];
+    let found = from_records(&plant, records, &Settings::default()).unwrap();
+    assert!(!found.one_step.unknown.is_empty());
+    assert!(
+        found
+            .warnings
+            .iter()
+            .any(|w| w.message.contains("cannot tell"))
+    );
+    let page = excite::load::report::html(&found);
+    assert!(page.contains("not identifiable"));
+}
+
+#[test]
+fn what_cannot_be_is_refused_in_words() {
+    let plant = Plant::load("hexapod").unwrap();
+    let x = multisine(&plant, 100, 100.0, &[2.0, 3.0], 1);
+    let tau = torque(&plant, &x, &Truth::default(), 1);
+    let none = vec![loaded(prepared("a", &x, tau, 100.0), Payload::None)];
+    let e = from_records(&plant, none, &Settings::default()).unwrap_err();
+    assert!(e.to_string().contains("payload = \"unknown\""), "{e}");
+    let mut silent = prepared("b", &x, Vec::new(), 100.0);
+    silent.actuators = 6;
+    let e = from_records(
+        &plant,
+        vec![loaded(silent, Payload::Unknown)],
+        &Settings::default(),
+    )
+    .unwrap_err();
+    assert!(e.to_string().contains("pressures"), "{e}");
+}
+
+/// Chamber pressures instead of forces: areas from the robot file, absolute pressures.
+#[test]
+fn pressures_give_forces() {
+    let mut text = excite::mechanism::bundled::find("hexapod")
+        .unwrap()
+        .toml
+        .to_string();
+    text = text.replace(
+        "[actuator]\n",
+        "[actuator]\npiston = [1.963e-3, 1.649e-3]\n",
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("hexapod.toml");
+    std::fs::write(&path, text).unwrap();
+    let plant = Plant::load(&path.to_string_lossy()).unwrap();
+    assert_eq!(plant.actuators()[3].piston, Some([1.963e-3, 1.649e-3]));
+    let mut csv = String::from("t,q1,q2,q3,q4,q5,q6");
+    for j in 1..=6 {
+        csv.push_str(&format!(",pa{j},pb{j}"));
+    }
+    csv.push('\n');
+    let x = multisine(&plant, 200, 100.0, &[2.0, 3.0], 1);
+    let q = plant.actuator_motion(&x).unwrap().q;
+    for i in 0..200 {
+        csv.push_str(&format!("{}", i as f64 / 100.0));
+        for a in 0..6 {
+            csv.push_str(&format!(",{}", q[a * 200 + i]));
+        }
+        for a in 0..6 {
+            csv.push_str(&format!(
+                ",{},{}",
+                4e5 + 1e3 * (a + i % 7) as f64,
+                3e5 - 500.0 * (i % 5) as f64
+            ));
+        }
+        csv.push('\n');
+    }
+    let log = dir.path().join("log.csv");
+    std::fs::write(&log, csv).unwrap();
+    let record = excite::log::Record::read(&log, &plant, Purpose::Fit, None).unwrap();
+    let forces = excite::load::pressure_forces(&record, &plant, 101_325.0)
+        .unwrap()
+        .unwrap();
+    let wanted = (4e5 + 2e3 + 1e3) * 1.963e-3 - (3e5 - 500.0) * 1.649e-3 - 101_325.0 * 0.314e-3;
+    assert!(
+        (forces.tau[2][1] - wanted).abs() < 1e-9,
+        "{} {wanted}",
+        forces.tau[2][1]
+    );
+    let bare = Plant::load("hexapod").unwrap();
+    let e = excite::load::pressure_forces(&record, &bare, 101_325.0).unwrap_err();
+    assert!(e.to_string().contains("piston ="), "{e}");
+}

@@ -1,0 +1,306 @@
+//! Logs with everything that goes wrong with them.
+
+use excite::Plant;
+use excite::log::{Experiment, Payload, Purpose, Record, Table};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// A log of `planar2` with `edit` applied to each line's cells.
+fn log(
+    name: &str,
+    dir: &tempfile::TempDir,
+    n: usize,
+    edit: impl Fn(usize, &mut Vec<String>),
+) -> PathBuf {
+    let mut text = String::from("t,q1,q2,tau1,tau2\n");
+    for i in 0..n {
+        let t = 0.002 * i as f64;
+        let mut cells: Vec<String> = [
+            t,
+            0.5 * (2.0 * t).sin(),
+            0.4 * (3.0 * t).cos(),
+            3.0 * (2.0 * t + 0.3).sin() + 0.01 * (977.0 * t).sin(),
+            2.0 * (3.0 * t).sin() + 0.01 * (877.0 * t).sin(),
+        ]
+        .iter()
+        .map(|x| x.to_string())
+        .collect();
+        edit(i, &mut cells);
+        if !cells.is_empty() {
+            let _ = writeln!(text, "{}", cells.join(","));
+        }
+    }
+    let path = dir.path().join(name);
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn read(path: &PathBuf) -> excite::Result<Record> {
+    Record::read(path, &Plant::load("planar2").unwrap(), Purpose::Fit, None)
+}
+
+fn says(record: &Record, words: &[&str]) {
+    let all: Vec<String> = record.warnings.iter().map(ToString::to_string).collect();
+    for w in words {
+        assert!(all.iter().any(|t| t.contains(w)), "`{w}` in {all:#?}");
+    }
+}
+
+#[test]
+fn a_clean_log_is_taken_as_it_is() {
+    let dir = folder();
+    let r = read(&log("clean.csv", &dir, 1000, |_, _| {})).unwrap();
+    assert!(r.warnings.is_empty(), "{:?}", r.warnings);
+    assert!(!r.resampled && r.len() == 1000 && (r.step - 0.002).abs() < 1e-12);
+    assert!(r.valid.iter().all(|v| *v));
+    assert_eq!(r.q[1][0], 0.4);
+    assert_eq!(r.name, "clean");
+}
+
+#[test]
+fn time_stamps_are_repaired_and_said() {
+    let dir = folder();
+    // jitter of a fifth of a step
+    let r = read(&log("jitter.csv", &dir, 2000, |i, c| {
+        let t = 0.002 * i as f64 + 0.0004 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
+        c[0] = t.to_string();
+        c[1] = (0.5 * (2.0 * t).sin()).to_string();
+    }))
+    .unwrap();
+    says(&r, &["jitter", "even grid"]);
+    assert!(r.resampled);
+    for (t, q) in r.t.iter().zip(&r.q[0]) {
+        assert!((q - 0.5 * (2.0 * t).sin()).abs() < 1e-8, "{t}");
+    }
+    // a gap of 40 samples
+    let r = read(&log("gap.csv", &dir, 2000, |i, c| {
+        if (500..540).contains(&i) {
+            c.clear();
+        }
+    }))
+    .unwrap();
+    says(&r, &["1 gaps in the time", "40 samples"]);
+    assert_eq!(r.len(), 2000);
+    assert!(!r.valid[520] && r.valid[400] && r.valid[600]);
+    // duplicates
+    let r = read(&log("twice.csv", &dir, 2000, |i, c| {
+        if i % 100 == 50 {
+            c[0] = (0.002 * (i - 1) as f64).to_string();
+        }
+    }))
+    .unwrap();
+    says(&r, &["20 time stamps repeat"]);
+    assert_eq!(r.len(), 2000);
+    assert!((r.step - 0.002).abs() < 1e-9);
+    // a counter of 32 bit of microseconds that wraps
+    let r = read(&log("wrap.csv", &dir, 2000, |i, c| {
+        let t = 4294.0 + 0.002 * i as f64;
+        c[0] = (t % 4294.967296).to_string();
+    }))
+    .unwrap();
+    says(&r, &["32 bit of microseconds", "wrapped"]);
+    assert!((r.t[1999] - r.t[0] - 0.002 * 1999.0).abs() < 0.003);
+    // a clock of milliseconds at 500 Hz would do; one of 10 ms is too coarse
+    let r = read(&log("coarse.csv", &dir, 2000, |i, c| {
+        c[0] = (0.01 * (i / 5) as f64).to_string()
+    }))
+    .unwrap();
+    says(&r, &["coarser than the sampling"]);
+    assert!((r.step - 0.002).abs() < 1e-5);
+    let r = read(&log("ms.csv", &dir, 2000, |i, c| {
+        c[0] = (2 * i).to_string()
+    }))
+    .unwrap();
+    says(&r, &["milliseconds"]);
+}
+
+#[test]
+fn channels_that_cannot_be_are_named() {
+    let dir = folder();
+    let r = read(&log("holes.csv", &dir, 2000, |i, c| {
+        if i % 200 == 7 {
+            c[3] = if i % 400 == 7 {
+                String::new()
+            } else {
+                "nan".into()
+            };
+        }
+    }))
+    .unwrap();
+    says(&r, &["tau1: 10 of 2000 values were dropped"]);
+    assert!(!r.valid[7] && r.valid[8] && r.tau[0].iter().all(|x| x.is_finite()));
+    let r = read(&log("clipped.csv", &dir, 3000, |i, c| {
+        let t = 0.002 * i as f64;
+        c[4] = ((2.0 * (3.0 * t).sin() + 0.01 * (877.0 * t).sin()).clamp(-1.5, 1.5)).to_string();
+    }))
+    .unwrap();
+    says(&r, &["tau2", "saturated"]);
+    assert!(r.valid.iter().filter(|v| !**v).count() > 300);
+    let r = read(&log("stuck.csv", &dir, 3000, |i, c| {
+        if (1000..1100).contains(&i) {
+            c[3] = "1.25".into();
+        }
+    }))
+    .unwrap();
+    says(&r, &["tau1", "stands still 1 times", "100 samples"]);
+    assert!(!r.valid[1050] && r.valid[900]);
+    let r = read(&log("still.csv", &dir, 1000, |_, c| c[2] = "0.3".into())).unwrap();
+    says(&r, &["q2", "does not move"]);
+    let r = read(&log("degrees.csv", &dir, 1000, |i, c| {
+        c[1] = (57.29578 * 0.5 * (0.004 * i as f64).sin()).to_string();
+    }))
+    .unwrap();
+    says(&r, &["degrees"]);
+}
+
+#[test]
+fn what_is_no_log_is_an_error_with_its_place() {
+    let dir = folder();
+    let error = |path: PathBuf| read(&path).unwrap_err().to_string();
+    let e = error(log("short.csv", &dir, 100, |i, c| {
+        if i == 41 {
+            c.pop();
+        }
+    }));
+    assert!(
+        e.contains("line 43") && e.contains("4 cells") && e.contains('5'),
+        "{e}"
+    );
+    let e = error(log("word.csv", &dir, 100, |i, c| {
+        if i == 9 {
+            c[2] = "fault".into();
+        }
+    }));
+    assert!(
+        e.contains("line 11") && e.contains("q2") && e.contains("fault"),
+        "{e}"
+    );
+    let e = error(log("rest.csv", &dir, 100, |_, c| {
+        c[1] = "0.1".into();
+        c[2] = "0.2".into();
+    }));
+    assert!(e.contains("nothing moves"), "{e}");
+    let e = error(log("none.csv", &dir, 100, |_, c| c[4] = "nan".into()));
+    assert!(e.contains("tau2") && e.contains("not recorded"), "{e}");
+    for (header, word) in [
+        ("t,q1,q2,q3,tau1,tau2,tau3", "2 actuated joints"),
+        ("t,q0,q1,tau0,tau1", "counted from 1"),
+        ("t,q1,tau1,tau2", "not q2"),
+        ("time,q1,q2,tau1,tau2", "called time"),
+        ("t,q1,q2", "no columns tau1"),
+        ("t;q1;q2;tau1;tau2", "semicolons"),
+        ("t,q1,q1,tau1,tau2", "twice"),
+        ("0.0,1.0,2.0,3.0,4.0", "names of the columns"),
+    ] {
+        let path = dir.path().join("header.csv");
+        let row = header
+            .split([',', ';'])
+            .map(|_| "1")
+            .collect::<Vec<_>>()
+            .join(",");
+        std::fs::write(&path, format!("{header}\n{row}\n{row}\n")).unwrap();
+        let e = error(path);
+        assert!(e.contains(word) && e.contains("line 1"), "{header}: {e}");
+    }
+    let path = dir.path().join("empty.csv");
+    std::fs::write(&path, "").unwrap();
+    assert!(error(path).contains("empty"));
+}
+
+#[test]
+fn a_recording_cut_in_its_last_line_is_read() {
+    let dir = folder();
+    let path = log("cut.csv", &dir, 500, |_, _| {});
+    let mut text = std::fs::read_to_string(&path).unwrap();
+    text.push_str("1.0,0.25");
+    std::fs::write(&path, text).unwrap();
+    let r = read(&path).unwrap();
+    says(&r, &["breaks off"]);
+    assert_eq!(r.len(), 500);
+}
+
+#[test]
+fn large_files_are_read_in_blocks() {
+    let dir = folder();
+    let path = dir.path().join("large.csv");
+    let mut text = String::from("\u{feff}t,a,b\r\n# comment\r\n");
+    let n = 600_000;
+    for i in 0..n {
+        let _ = write!(text, "{},{}.5,-{}e-3\r\n", i, i, i);
+    }
+    std::fs::write(&path, &text).unwrap();
+    let table = Table::read(&path, &|name| name != "a").unwrap();
+    assert_eq!(table.rows(), n);
+    assert!(table.columns[1].is_empty());
+    for i in [0, 1, 77_777, n - 1] {
+        assert_eq!(table.columns[0][i], i as f64);
+        assert_eq!(table.columns[2][i], -(i as f64) / 1000.0);
+    }
+    // the line of an error is right in any block
+    let broken = text.replacen("500000,500000.5", "500000,x", 1);
+    std::fs::write(&path, broken).unwrap();
+    let e = Table::read(&path, &|_| true).unwrap_err().to_string();
+    assert!(e.contains("line 500003"), "{e}");
+}
+
+#[test]
+fn an_experiment_is_read_with_its_records() {
+    let dir = folder();
+    log("one.csv", &dir, 4000, |_, _| {});
+    log("two.csv", &dir, 1000, |_, _| {});
+    let path = dir.path().join("experiment.toml");
+    let write = |text: &str| std::fs::write(&path, text).unwrap();
+    write(
+        "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiod = 6.283185307179586\n\
+         [[record]]\nlog = \"two.csv\"\nuse = \"holdout\"\npayload = { mass = 2.0, com = [0, 0, 0.05] }\n",
+    );
+    let e = Experiment::read(&path).unwrap();
+    assert_eq!(e.records.len(), 2);
+    assert_eq!(e.records(Purpose::Holdout).count(), 1);
+    assert!(matches!(
+        e.records[1].payload,
+        Payload::Known { mass: 2.0, .. }
+    ));
+    // 6.283 s are 3141.59 steps of 2 ms: the grid is made to divide the period
+    let r = &e.records[0];
+    assert!((r.step * 3142.0 - 6.283185307179586).abs() < 1e-12);
+    assert_eq!(r.periods(), Some((3142, 1)));
+    for (text, word) in [
+        (
+            "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"train\"\n",
+            "train",
+        ),
+        (
+            "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiods = 3\n",
+            "periods",
+        ),
+        (
+            "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiod = -1.0\n",
+            "positive",
+        ),
+        (
+            "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\npayload = \"heavy\"\n",
+            "heavy",
+        ),
+        (
+            "robot = \"planar2\"\n[[record]]\nlog = \"gone.csv\"\nuse = \"fit\"\n",
+            "gone.csv",
+        ),
+        (
+            "robot = \"nosuch\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\n",
+            "nosuch",
+        ),
+        (
+            "robot = \"ur5e\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\n",
+            "6 actuated joints",
+        ),
+    ] {
+        write(text);
+        let e = Experiment::read(&path).unwrap_err().to_string();
+        assert!(e.contains(word), "{word}: {e}");
+    }
+}

@@ -1,0 +1,226 @@
+//! Filters, derivatives, cut-offs and period averages.
+
+use excite::signals::butterworth::{Butterworth, first_derivative, second_derivative};
+use excite::signals::{Decimator, cutoff, fourier};
+use rand::{Rng, SeedableRng};
+use std::f64::consts::PI;
+
+fn signal(n: usize) -> Vec<f64> {
+    (0..n)
+        .map(|i| {
+            let i = i as f64;
+            (0.1 * i).sin() + 0.3 * (0.37 * i).cos() + 0.01 * i
+        })
+        .collect()
+}
+
+/// `scipy.signal.sosfiltfilt(butter(order, fc, fs=fs, output='sos'), x, padlen=…)`, SciPy 1.16.
+#[test]
+fn zero_phase_filter_is_that_of_scipy() {
+    type Case = (
+        usize,
+        f64,
+        f64,
+        usize,
+        Option<usize>,
+        &'static [(usize, f64)],
+    );
+    let cases: [Case; 3] = [
+        (
+            4,
+            10.0,
+            200.0,
+            300,
+            None,
+            &[
+                (0, 0.28527729802954155),
+                (1, 0.3058223151931768),
+                (7, 0.579837348941879),
+                (100, 0.5038849267706068),
+                (150, 2.1814023920391548),
+                (298, 1.7898178506144211),
+                (299, 1.725652211270817),
+            ],
+        ),
+        (
+            3,
+            10.0,
+            200.0,
+            300,
+            None,
+            &[
+                (0, 0.2779572848644012),
+                (1, 0.30671288399958535),
+                (7, 0.5876488490781698),
+                (100, 0.5182304696709151),
+                (150, 2.18985106349993),
+                (298, 1.7811901471120801),
+                (299, 1.7270520201694706),
+            ],
+        ),
+        (
+            8,
+            0.5,
+            1000.0,
+            6000,
+            Some(3000),
+            &[
+                (0, 0.25267512579041407),
+                (7, 0.32000229429157195),
+                (2000, 20.004571770489466),
+                (3000, 30.005198426265192),
+                (5999, 59.96021988723665),
+            ],
+        ),
+    ];
+    for (order, fc, rate, n, pad, values) in cases {
+        let f = Butterworth::low_pass(order, fc, rate).unwrap();
+        let y = f.zero_phase(&signal(n), pad.unwrap_or(f.default_pad()));
+        for &(k, v) in values {
+            let tolerance = if order == 8 { 1e-7 } else { 1e-12 };
+            assert!(
+                (y[k] - v).abs() < tolerance,
+                "order {order}, sample {k}: {} {v}",
+                y[k]
+            );
+        }
+    }
+    assert!(Butterworth::low_pass(4, 100.0, 200.0).is_err());
+    assert!(Butterworth::low_pass(0, 10.0, 200.0).is_err());
+}
+
+#[test]
+fn differences_are_of_sixth_order() {
+    let h = 0.01;
+    let omega = 6.0;
+    let x: Vec<f64> = (0..200).map(|i| (omega * h * i as f64).sin()).collect();
+    let (d, dd) = (first_derivative(&x, h), second_derivative(&x, h));
+    for i in 10..190 {
+        let t = omega * h * i as f64;
+        assert!((d[i] - omega * t.cos()).abs() < 1e-8 * omega);
+        assert!((dd[i] + omega * omega * t.sin()).abs() < 1e-8 * omega * omega);
+    }
+}
+
+#[test]
+fn any_length_is_transformed_and_periodic_signals_are_differentiated_exactly() {
+    for n in [1usize, 2, 7, 64, 120, 6240, 997] {
+        let x: Vec<f64> = signal(n);
+        let s = fourier::spectrum(&x);
+        for k in [0, 1, n / 3, n - 1] {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (i, v) in x.iter().enumerate() {
+                let a = -2.0 * PI * ((k * i) % n) as f64 / n as f64;
+                re += v * a.cos();
+                im += v * a.sin();
+            }
+            assert!(
+                (s[k % n][0] - re).abs() + (s[k % n][1] - im).abs() < 1e-9 * n as f64,
+                "{n} {k}"
+            );
+        }
+    }
+    let (n, period) = (1250, 2.5);
+    let w = 2.0 * PI / period;
+    let f = |t: f64| 0.4 + (w * t).sin() - 0.2 * (5.0 * w * t).cos();
+    let x: Vec<f64> = (0..n).map(|i| f(period * i as f64 / n as f64)).collect();
+    let [q, qd, qdd] = fourier::derivatives(&x, period, 8);
+    for i in 0..n {
+        let t = period * i as f64 / n as f64;
+        assert!((q[i] - f(t)).abs() < 1e-12);
+        assert!((qd[i] - w * (w * t).cos() - w * (5.0 * w * t).sin()).abs() < 1e-11);
+        let second = -w * w * (w * t).sin() + 5.0 * w * w * (5.0 * w * t).cos();
+        assert!((qdd[i] - second).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn the_parallel_filter_is_flat_linear_and_blind_to_what_was_not_measured() {
+    let (n, rate, fc) = (4000, 1000.0, 20.0);
+    let mut valid = vec![true; n];
+    let d = Decimator::new(fc, rate, &valid, false);
+    assert_eq!(d.factor, 16);
+    let wave = |f: f64| -> Vec<f64> {
+        (0..n)
+            .map(|i| (2.0 * PI * f * i as f64 / rate).sin())
+            .collect()
+    };
+    let gain = |f: f64| {
+        let (y, x) = (d.apply(&wave(f)), wave(f));
+        let worst = d
+            .at()
+            .iter()
+            .zip(&y)
+            .map(|(&i, y)| (y - x[i]).abs())
+            .fold(0.0, f64::max);
+        (worst, y.iter().fold(0.0f64, |m, v| m.max(v.abs())))
+    };
+    assert!(
+        gain(3.0).0 < 2e-4 && gain(10.0).0 < 2e-4,
+        "pass band without phase"
+    );
+    assert!(gain(31.0).1 < 2e-4 && gain(200.0).1 < 2e-4, "stop band");
+    assert!((gain(20.0).1 - 0.5).abs() < 0.02);
+    // a hole of nonsense leaves no trace
+    valid[2000..2010].fill(false);
+    let d = Decimator::new(fc, rate, &valid, false);
+    let clean = wave(5.0);
+    let mut dirty = clean.clone();
+    dirty[2000..2010].fill(1e9);
+    assert_eq!(d.apply(&clean), d.apply(&dirty));
+    assert!(d.outputs() > 150);
+    // in parts as at once
+    let whole = d.apply(&clean);
+    let mut part = vec![0.0; 40];
+    let inputs = d.inputs(30..70);
+    let x: Vec<f64> = inputs.iter().map(|&i| clean[i]).collect();
+    // a range across the hole has outputs on both sides; one side is enough here
+    if d.at()[69] - d.at()[30] == 39 * d.factor {
+        d.apply_part(&x, 30..70, &mut part);
+        for (a, b) in part.iter().zip(&whole[30..70]) {
+            assert!((a - b).abs() < 1e-14);
+        }
+    }
+    // a signal that repeats has no ends
+    let cyclic = Decimator::new(fc, rate, &vec![true; n], true);
+    assert_eq!(cyclic.outputs(), n / 16);
+    let y = cyclic.apply(&clean);
+    assert!(
+        cyclic
+            .at()
+            .iter()
+            .zip(&y)
+            .all(|(&i, y)| (y - clean[i]).abs() < 2e-4)
+    );
+    let mut wrapped = vec![0.0; 5];
+    let inputs = cyclic.inputs(0..5);
+    let x: Vec<f64> = inputs.iter().map(|&i| clean[i]).collect();
+    cyclic.apply_part(&x, 0..5, &mut wrapped);
+    assert!(wrapped.iter().zip(&y).all(|(a, b)| (a - b).abs() < 1e-14));
+}
+
+#[test]
+fn the_cutoff_lies_where_motion_sinks_into_noise() {
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let rate = 1000.0;
+    let q: Vec<f64> = (0..20_000)
+        .map(|i| {
+            let t = i as f64 / rate;
+            let noise: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
+            (2.0 * PI * 0.7 * t).sin() + 0.1 * (2.0 * PI * 6.0 * t).sin() + 1e-5 * noise
+        })
+        .collect();
+    let c = cutoff::aperiodic(&q, rate);
+    assert!((6.0..12.0).contains(&c.frequency), "{}", c.frequency);
+    let truth = 2.0 * 1e-10 / rate;
+    assert!(
+        (0.5 * truth..2.0 * truth).contains(&c.floor),
+        "{} {truth}",
+        c.floor
+    );
+    assert!((5.5..7.0).contains(&cutoff::bandwidth(&q, rate)));
+    // periods of 4 s: the same from their scatter
+    let parts: Vec<&[f64]> = q.chunks_exact(10_000).collect();
+    let (k, c) = cutoff::periodic(&parts, 10.0);
+    assert!((60..110).contains(&k), "{k} {}", c.frequency);
+}
