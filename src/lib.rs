@@ -55,6 +55,7 @@
 pub mod base;
 pub mod conic;
 pub mod design;
+pub mod diagnose;
 pub mod dynamics;
 pub mod error;
 pub mod estimate;

@@ -45,6 +45,7 @@ fn frictionless(name: &str) -> Plant {
     let mut robot = excite::Robot::load(name).unwrap();
     for joint in &mut robot.joints {
         joint.terms[1..].fill(0.0);
+        joint.limits.effort = f64::INFINITY;
     }
     Plant::Serial(robot)
 }
@@ -122,8 +123,8 @@ fn energy_balance() {
         // Simpson over an even number of intervals
         let m = (n - 1) / 2 * 2;
         let mut work = power[0] + power[m];
-        for k in 1..m {
-            work += power[k] * if k % 2 == 1 { 4.0 } else { 2.0 };
+        for (k, p) in power.iter().enumerate().take(m).skip(1) {
+            work += p * if k % 2 == 1 { 4.0 } else { 2.0 };
         }
         work /= 3.0 * 2000.0;
         let top = kinetic.iter().cloned().fold(0.0, f64::max);
@@ -146,7 +147,7 @@ fn agreement(plant: &Plant, run: &Run) -> (f64, usize) {
         for k in 0..n {
             let v = run.actuators.qd[a * n + k];
             let e = run.tau[a * n + k] - tau[a * n + k];
-            if v.abs() > 1e-8 {
+            if v.abs() > 1e-6 {
                 worst = worst.max(e.abs() / top);
             } else {
                 stuck += 1;
@@ -165,8 +166,9 @@ fn agreement(plant: &Plant, run: &Run) -> (f64, usize) {
 fn inverse_dynamics_on_the_motion_gives_the_torque() {
     for name in ["panda", "ur10e", "scara", "hexapod", "h4", "delta"] {
         let plant = Plant::load(name).unwrap();
-        let fourier = motion(&plant, 3.0, 0.5, 5);
+        let fourier = motion(&plant, 5.0, 0.4, 5);
         let run = simulate(&plant, &fourier, 1, &quick(), &|_| {}).unwrap();
+        assert!(run.warnings.is_empty(), "{:?}", run.warnings);
         let (worst, _) = agreement(&plant, &run);
         assert!(worst < 1e-9, "{name}: {worst:.1e}");
         let n = run.t.len();
@@ -293,7 +295,7 @@ fn stribeck_friction_and_payload_show_in_the_torque() {
         for k in 0..n {
             let v = run.actuators.qd[a * n + k];
             let stribeck = 15.0 * (-(v / 0.01f64).powi(2)).exp() * v.signum();
-            if v.abs() > 1e-8 {
+            if v.abs() > 1e-6 {
                 let e = run.tau[a * n + k] - tau[a * n + k] - stribeck;
                 assert!(e.abs() < 1e-6, "{a} {k}: {e}");
             }
@@ -441,7 +443,7 @@ fn the_command_writes_a_log_and_an_experiment_and_refuses_nonsense() {
         (&["--stribeck", "1"], "EXTRA,VELOCITY"),
         (&["--payload", "-1,0,0,0"], "mass > 0"),
         (&["--payload", "1,2"], "numbers"),
-        (&["--rate", "-5"], "positive"),
+        (&["--rate", "0"], "positive"),
         (&["--perturb", "2"], "fraction"),
         (&["--pose"], "no platform"),
         (&["--tilt", "1"], "RX,RY"),

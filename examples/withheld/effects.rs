@@ -23,7 +23,7 @@ pub const CATALOGUE: &[(&str, bool, bool)] = &[
     ("payload", true, false),
     ("link_inertia", true, false),
     ("gravity_direction", true, false),
-    ("rotor_inertia", false, false),
+    ("rotor_inertia", true, false),
     ("viscous_friction", false, false),
     ("coulomb_friction", false, false),
     ("torque_offset", false, false),

@@ -76,7 +76,7 @@ impl Friction {
         let mut coulomb = self.coulomb[0] * forward + self.coulomb[1] * (1.0 - forward);
         coulomb *= drag;
         if let Some([a, pa, b, pb]) = self.around {
-            coulomb *= (1.0 + a * (q + pa).cos() + b * (2.0 * q + pb).cos()).max(0.05);
+            coulomb *= 1.0 + a * (1.0 + (q + pa).cos()) + b * (1.0 + (2.0 * q + pb).cos());
         }
         let (mut f, mut df) = match &mut self.dry {
             Dry::Sign => {

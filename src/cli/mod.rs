@@ -2,6 +2,7 @@
 //! unusable arguments. Nothing but results goes to standard output.
 
 mod design;
+mod diagnose;
 mod identifiability;
 mod identify;
 mod load;
@@ -41,6 +42,8 @@ enum Command {
     Identify(identify::Args),
     /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
+    /// Diagnose the gap between a model and its robot
+    Diagnose(diagnose::Args),
     /// Rehearse an experiment: simulate the robot and write a log
     Simulate(simulate::Args),
     /// Identify the load that a robot carries
@@ -59,6 +62,7 @@ pub fn main() -> ExitCode {
         Command::Identifiability(a) => identifiability::run(a),
         Command::Identify(a) => identify::run(a),
         Command::Torque(a) => torque::run(a),
+        Command::Diagnose(a) => diagnose::run(a),
         Command::Simulate(a) => simulate::run(a),
         Command::Load(a) => load::run(a),
         Command::Robots(a) => robots::run(a),

@@ -170,6 +170,15 @@ pub fn run(args: Args) -> Result<()> {
             return Err(Error::Exists(file.clone()));
         }
     }
+    // before the work, so that nothing is lost to a folder that is not there
+    for file in [Some(&args.output), args.experiment.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        if let Some(folder) = file.parent().filter(|f| !f.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
+        }
+    }
     if !(args.noise >= 0.0 && args.noise.is_finite()) {
         return Err(Error::Argument(format!(
             "--noise is a factor of 0 or more, not {}",
@@ -309,7 +318,10 @@ fn summary(plant: &Plant, run: &Run, args: &Args, periods: u32, period: f64) -> 
 
 /// Writes the experiment, or one more record of it.
 fn experiment(path: &Path, args: &Args, period: f64, periods: u32) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
     let relative = |file: &Path| -> String {
         let absolute = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
         let base = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());

@@ -21,6 +21,10 @@ pub struct JointFriction {
     pub viscous: f64,
     /// constant
     pub offset: f64,
+    /// what breaking away takes beyond Coulomb friction, N m or N, where the residual shows it
+    pub stribeck: Option<f64>,
+    /// speed at which that has fallen to `1/e`, rad/s or m/s
+    pub stribeck_velocity: Option<f64>,
     /// Coulomb friction of every period, where the motion repeats
     pub coulomb_periods: Vec<f64>,
     /// viscous friction of every period
@@ -77,7 +81,7 @@ pub struct OneStep {
 }
 
 /// Rounds of reweighting.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 10;
 
 /// Values of all columns: deviations, load, then friction record by record.
 pub(super) struct Solution {
@@ -92,7 +96,14 @@ pub(super) struct Solver<'a> {
     load: Vec<usize>,
     /// what is subtracted from the torques of loaded records, part by part
     shift: Vec<Vec<f64>>,
+    /// Stribeck speed of each actuator, where its residual shows one
+    speeds: Vec<Option<f64>>,
+    /// Stribeck factors, part by part
+    peaks: Vec<Vec<f64>>,
 }
+
+/// Friction columns of an actuator in a record: Coulomb, viscous, offset, Stribeck.
+const EACH: usize = 4;
 
 impl<'a> Solver<'a> {
     pub(super) fn new(system: &'a System, load: Vec<usize>) -> Self {
@@ -100,17 +111,19 @@ impl<'a> Solver<'a> {
             system,
             load,
             shift: vec![Vec::new(); system.parts.len()],
+            speeds: vec![None; system.actuators],
+            peaks: system.parts.iter().map(|p| vec![0.0; p.y.len()]).collect(),
         }
     }
 
     fn columns(&self) -> usize {
-        let friction = 3 * self.system.actuators * self.system.parts.len();
+        let friction = EACH * self.system.actuators * self.system.parts.len();
         self.system.deviations.len() + self.load.len() + friction
     }
 
     /// First friction column of a record.
     fn friction(&self, part: usize) -> usize {
-        self.system.deviations.len() + self.load.len() + 3 * self.system.actuators * part
+        self.system.deviations.len() + self.load.len() + EACH * self.system.actuators * part
     }
 
     fn row(&self, p: usize, part: &Part, i: usize, to: &mut dyn FnMut(usize, f64)) {
@@ -123,9 +136,84 @@ impl<'a> Solver<'a> {
                 to(nd + c, part.tool[(i, k)]);
             }
         }
-        let first = self.friction(p) + 3 * (i / part.count);
+        let first = self.friction(p) + EACH * (i / part.count);
         for (f, column) in part.friction.iter().enumerate() {
             to(first + f, column[i]);
+        }
+        to(first + 3, self.peaks[p][i]);
+    }
+
+    /// Looks for Stribeck friction in the residuals: for each actuator the speed `v_s` whose
+    /// factor explains most of them, one force a record. It is kept where it explains more than
+    /// chance would (BIC).
+    fn find_peaks(&mut self, s: &Solution, sigma: &[f64]) {
+        for (a, sigma) in sigma.iter().enumerate() {
+            // residuals without the Stribeck force found so far
+            let rest: Vec<Vec<f64>> = self
+                .system
+                .parts
+                .iter()
+                .enumerate()
+                .map(|(p, part)| {
+                    let force = s.values[self.friction(p) + EACH * a + 3];
+                    (a * part.count..(a + 1) * part.count)
+                        .map(|i| s.residual[p][i] + force * self.peaks[p][i])
+                        .collect()
+                })
+                .collect();
+            let total: f64 = rest.iter().flatten().map(|r| r * r).sum();
+            let n: usize = rest.iter().map(Vec::len).sum();
+            let explained = |speed: f64| -> f64 {
+                self.system
+                    .parts
+                    .iter()
+                    .zip(&rest)
+                    .map(|(part, r)| {
+                        let b = part.stribeck(a, speed);
+                        let bb: f64 = b.iter().map(|x| x * x).sum();
+                        let br: f64 = b.iter().zip(r).map(|(x, y)| x * y).sum();
+                        if bb > 1e-9 { br * br / bb } else { 0.0 }
+                    })
+                    .sum()
+            };
+            let fastest = self
+                .system
+                .parts
+                .iter()
+                .flat_map(|p| &p.speed[a * p.count..(a + 1) * p.count])
+                .fold(0.0f64, |m, v| m.max(v.abs()));
+            // a grid, then the golden section about its best point
+            const STEP: f64 = 1.35;
+            let grid = (0..15).map(|k| 0.005 * fastest * STEP.powi(k));
+            let best = grid
+                .map(|v| (explained(v), v))
+                .max_by(|x, y| x.0.total_cmp(&y.0));
+            let Some((_, centre)) = best.filter(|b| b.0.is_finite() && b.1 > 0.0) else {
+                continue;
+            };
+            let (mut low, mut high) = ((centre / STEP).ln(), (centre * STEP).ln());
+            for _ in 0..12 {
+                let (u, v) = (low + 0.382 * (high - low), high - 0.382 * (high - low));
+                if explained(u.exp()) > explained(v.exp()) {
+                    high = v;
+                } else {
+                    low = u;
+                }
+            }
+            let speed = (0.5 * (low + high)).exp();
+            let left = (total - explained(speed)).max(n as f64 * (1e-6 * sigma).powi(2));
+            let gain = n as f64 * (total / left).ln();
+            let price = 2.0 * (self.system.parts.len() + 1) as f64 * (n as f64).ln();
+            self.speeds[a] = (gain > price && total > 0.0).then_some(speed);
+        }
+        for (p, part) in self.system.parts.iter().enumerate() {
+            for (a, speed) in self.speeds.iter().enumerate() {
+                let to = &mut self.peaks[p][a * part.count..(a + 1) * part.count];
+                match speed {
+                    Some(v) => to.copy_from_slice(&part.stribeck(a, *v)),
+                    None => to.fill(0.0),
+                }
+            }
         }
     }
 
@@ -189,9 +277,9 @@ impl<'a> Solver<'a> {
         })
     }
 
-    /// Coulomb, viscous, offset of an actuator in a record.
-    pub(super) fn friction_of(&self, s: &Solution, part: usize, a: usize) -> [f64; 3] {
-        let first = self.friction(part) + 3 * a;
+    /// Coulomb, viscous, offset and Stribeck force of an actuator in a record.
+    pub(super) fn friction_of(&self, s: &Solution, part: usize, a: usize) -> [f64; EACH] {
+        let first = self.friction(part) + EACH * a;
         std::array::from_fn(|f| s.values[first + f])
     }
 }
@@ -253,6 +341,10 @@ pub fn estimate(
     let mut solution = solver.solve(&|p, i| weigh(&spreads, p, i))?;
     for _ in 0..ROUNDS {
         let before = solution.values.clone();
+        if settings.weighted {
+            let noise: Vec<f64> = spreads.iter().map(|s| s.floor).collect();
+            solver.find_peaks(&solution, &noise);
+        }
         if settings.parameters == Parameters::MassCom {
             point_mass(&mut solver, &kept, &solution.values[nd..nd + kept.len()]);
         }
@@ -271,7 +363,7 @@ pub fn estimate(
         let change = (nd..nd + kept.len())
             .map(|c| (solution.values[c] - before[c]).abs() / solution.values[c].abs().max(1e-9))
             .fold(0.0f64, f64::max);
-        if change < 1e-11 {
+        if change < 1e-8 {
             break;
         }
     }
@@ -456,6 +548,7 @@ fn fitted(system: &System, solver: &Solver, s: &Solution, load: &LoadBody, p: us
                 for f in 0..3 {
                     carried[i] -= values[f] * part.friction[f][i];
                 }
+                carried[i] -= values[3] * solver.peaks[p][i];
             }
             let (mut coulomb, mut viscous) = (Vec::new(), Vec::new());
             for period in &part.periods {
@@ -467,6 +560,8 @@ fn fitted(system: &System, solver: &Solver, s: &Solution, load: &LoadBody, p: us
                 coulomb: values[0],
                 viscous: values[1],
                 offset: values[2],
+                stribeck: solver.speeds[a].map(|_| values[3]),
+                stribeck_velocity: solver.speeds[a],
                 coulomb_periods: coulomb,
                 viscous_periods: viscous,
             }

@@ -400,6 +400,12 @@ fn friction(found: &Identified) -> Section {
                 range(&f.coulomb_periods),
                 html! { (significant(f.viscous, 3)) },
                 html! { (significant(f.offset, 3)) },
+                match (f.stribeck, f.stribeck_velocity) {
+                    (Some(force), Some(v)) => {
+                        html! { (significant(force, 3)) " at " (significant(v, 2)) }
+                    }
+                    _ => html! { "–" },
+                },
                 html! { (significant(r.residuals[a].rms, 3)) },
                 html! { (percent(r.residuals[a].relative)) },
             ]);
@@ -412,6 +418,7 @@ fn friction(found: &Identified) -> Section {
         "Coulomb, period by period",
         "viscous",
         "offset",
+        "Stribeck, at speed",
         "residual",
         "of the torque",
     ];

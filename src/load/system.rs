@@ -9,6 +9,7 @@ use crate::log::Payload;
 use crate::plant::Plant;
 use crate::regressor::{Regressor, term_factor};
 use crate::robot::{Column, JointTerm};
+use crate::signals::Decimator;
 use faer::Mat;
 
 /// Friction columns of an actuator in one record: Coulomb, viscous, offset.
@@ -41,6 +42,24 @@ pub struct Part {
     pub deviation: Mat<f64>,
     /// friction factors of each actuator, `FRICTION` order
     pub friction: [Vec<f64>; 3],
+    /// velocities of the actuators at full rate
+    raw_speed: Vec<f64>,
+    filter: Decimator,
+}
+
+impl Part {
+    /// Stribeck factor `exp(−(v/v_s)²) sign(v)` of an actuator, filtered like everything else.
+    pub fn stribeck(&self, a: usize, speed: f64) -> Vec<f64> {
+        let n = self.raw_speed.len() / (self.y.len() / self.count.max(1)).max(1);
+        let raw: Vec<f64> = self.raw_speed[a * n..(a + 1) * n]
+            .iter()
+            .map(|v| match *v == 0.0 {
+                true => 0.0,
+                false => (-(v / speed).powi(2)).exp() * v.signum(),
+            })
+            .collect();
+        self.filter.apply(&raw)
+    }
 }
 
 /// All records.
@@ -219,5 +238,7 @@ fn part(plant: &Plant, tool: usize, loaded: &Loaded, kept: &[usize]) -> Result<P
         tool: filter(&tool_full),
         deviation,
         friction,
+        raw_speed: moved.qd.clone(),
+        filter: record.filter.clone(),
     })
 }

@@ -289,8 +289,8 @@ impl Record {
             }
             // an encoder that stands still is stuck if the command goes on
             if let Some(qref) = &self.qref {
-                let awake = channels::moving(&qref[j], step);
-                if let Some(run) = channels::stuck(&self.q[j], step, &awake, &mut self.valid) {
+                let (q, qref) = (&self.q[j], &qref[j]);
+                if let Some(run) = channels::stuck_encoder(q, qref, step, &mut self.valid) {
                     self.warnings
                         .push(stuck(format!("{subject}: q{}", j + 1), run, step));
                 }

@@ -284,7 +284,14 @@ impl Simulator<'_> {
             now.broken.clear();
             let next = self.runge_kutta(t, &now, left)?;
             let Some((j, guess)) = self.crossing(&now, &next) else {
-                return Ok(next);
+                if next.broken.is_empty() {
+                    return Ok(next);
+                }
+                // what has broken away slides from here on, in the log as well
+                for &(j, positive) in &next.broken {
+                    self.modes[j] = Mode::Slides(positive);
+                }
+                return self.evaluate(t + left, &next.x, &next.xd);
             };
             let mut part = 0.0;
             if guess > 0.0 {
@@ -339,6 +346,9 @@ impl Simulator<'_> {
 
     /// Remembers the torque for the delayed sensor.
     fn remember(&mut self, t: f64, tau: &DVector<f64>) {
+        if self.history.back().is_some_and(|(last, _)| *last >= t) {
+            self.history.pop_back();
+        }
         if self.delay > 0.0 {
             self.history.push_back((t, tau.clone()));
             while self.history.len() > 2 && self.history[1].0 <= t - self.delay {

@@ -1,0 +1,175 @@
+//! The base tilts in proportion to the moment that the robot exerts on it.
+
+use super::*;
+
+/// Base compliance.
+pub struct BaseCompliance;
+
+impl Effect for BaseCompliance {
+    fn card(&self) -> Card {
+        Card {
+            name: "base_compliance",
+            title: "base compliance",
+            equation: "tilt κ M_base, with its gravity and inertia",
+            source: "Klimchik, Caro & Pashkevich 2013",
+            aliases: &[],
+            separated_by: "the same pose with another moment on the base",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        if cx.serial() {
+            vec![Vec::new()]
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+        let Some(moment) = base_moment(cx) else {
+            return Vec::new();
+        };
+        tilted(cx, |r, k, axis| {
+            let span = cx.data.span(k);
+            let yields: Vec<f64> = moment[axis][span].iter().map(|m| -m).collect();
+            cx.derivatives(r, &yields)
+        })
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+        let largest = eta.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        eta.iter().all(|t| *t > -0.3 * largest)
+    }
+
+    fn values(
+        &self,
+        _cx: &Context,
+        _place: &[usize],
+        _shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        vec![
+            value("compliance_x", eta[0], std[0], "rad/(N m)"),
+            value("compliance_y", eta[1], std[1], "rad/(N m)"),
+        ]
+    }
+}
+
+/// The robot on two more joints without mass that tilt its base about x and y.
+fn on_joints(robot: &crate::Robot) -> crate::Robot {
+    use nalgebra::{Matrix3, Vector3};
+    let mut out = robot.clone();
+    let (Some(body), Some(joint)) = (robot.bodies.first(), robot.joints.first()) else {
+        return out;
+    };
+    for b in &mut out.bodies {
+        b.parent = Some(b.parent.map_or(1, |p| p + 2));
+        b.coordinate += 2;
+    }
+    for (k, axis) in [Vector3::y(), Vector3::x()].into_iter().enumerate() {
+        let mut tilt = body.clone();
+        tilt.parent = (k == 1).then_some(0);
+        tilt.motion = Motion::Revolute;
+        tilt.axis = axis;
+        tilt.rotation = Matrix3::identity();
+        tilt.position = Vector3::zeros();
+        tilt.inertia = crate::robot::Inertia([0.0; 10]);
+        tilt.coordinate = 1 - k;
+        (tilt.ratio, tilt.offset) = (1.0, 0.0);
+        out.bodies.insert(k, tilt);
+        out.joints.insert(0, joint.clone());
+    }
+    out
+}
+
+/// Motion of that robot: tilts of the base first (x, then y).
+fn extended(r: &Record, tilts: [&[Vec<f64>; 3]; 2]) -> Samples {
+    let mut x = Samples::zeros(r.x.dof + 2, r.count);
+    for (k, tilt) in tilts.iter().enumerate() {
+        let row = k * r.count..(k + 1) * r.count;
+        x.q[row.clone()].copy_from_slice(&tilt[0]);
+        x.qd[row.clone()].copy_from_slice(&tilt[1]);
+        x.qdd[row].copy_from_slice(&tilt[2]);
+    }
+    let at = 2 * r.count;
+    x.q[at..].copy_from_slice(&r.x.q);
+    x.qd[at..].copy_from_slice(&r.x.qd);
+    x.qdd[at..].copy_from_slice(&r.x.qdd);
+    x
+}
+
+/// Bodies of the extended robot: two without mass, then those of the model.
+fn bodies(cx: &Context) -> Vec<f64> {
+    let mut phi = vec![0.0; 20];
+    phi.extend(&cx.phi[..10 * cx.data.plant.robot().bodies.len()]);
+    phi
+}
+
+/// Moment about the base axes x and y that the base exerts on the robot, over all records.
+fn base_moment(cx: &Context) -> Option<[Vec<f64>; 2]> {
+    let Plant::Serial(robot) = cx.data.plant else {
+        return None;
+    };
+    let tree = crate::dynamics::Tree::new(&on_joints(robot));
+    let phi = bodies(cx);
+    let mut out = [Vec::new(), Vec::new()];
+    for r in &cx.data.records {
+        let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
+        let x = extended(r, [&still, &still]);
+        let mut tau = vec![0.0; x.dof * x.count];
+        tree.inverse_dynamics(&mut Default::default(), &phi, &x, &mut tau);
+        for (k, out) in out.iter_mut().enumerate() {
+            out.extend_from_slice(&tau[k * r.count..(k + 1) * r.count]);
+        }
+    }
+    Some(out)
+}
+
+/// Columns for tilts of the base about x and about y; `motion` gives angle, rate and acceleration
+/// of a tilt of record `k` about axis 0 or 1, per unit of its coefficient.
+pub(crate) fn tilted(
+    cx: &Context,
+    motion: impl Fn(&Record, usize, usize) -> [Vec<f64>; 3],
+) -> Vec<Column> {
+    let Plant::Serial(robot) = cx.data.plant else {
+        return Vec::new();
+    };
+    let tree = crate::dynamics::Tree::new(&on_joints(robot));
+    let phi = bodies(cx);
+    let n = cx.data.joints();
+    (0..2)
+        .map(|axis| {
+            let mut rows = vec![Vec::with_capacity(cx.data.rows()); n];
+            for (k, r) in cx.data.records.iter().enumerate() {
+                let full = motion(r, k, axis);
+                let largest = full[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
+                let step = 1e-4 / largest;
+                let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
+                let side = |sign: f64| {
+                    let tilt: [Vec<f64>; 3] =
+                        std::array::from_fn(|d| full[d].iter().map(|v| sign * step * v).collect());
+                    let tilts = if axis == 0 {
+                        [&tilt, &still]
+                    } else {
+                        [&still, &tilt]
+                    };
+                    let x = extended(r, tilts);
+                    let mut tau = vec![0.0; x.dof * x.count];
+                    tree.inverse_dynamics(&mut Default::default(), &phi, &x, &mut tau);
+                    tau
+                };
+                let (plus, minus) = (side(1.0), side(-1.0));
+                for (j, row) in rows.iter_mut().enumerate() {
+                    let at = (j + 2) * r.count;
+                    row.extend((at..at + r.count).map(|i| (plus[i] - minus[i]) / (2.0 * step)));
+                }
+            }
+            prune(
+                Column {
+                    rows: rows.into_iter().enumerate().collect(),
+                },
+                0,
+            )
+        })
+        .collect()
+}

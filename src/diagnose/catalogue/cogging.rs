@@ -1,0 +1,106 @@
+//! Torque that repeats with the turn of the motor.
+
+use super::*;
+
+/// Cogging (torque ripple).
+pub struct Cogging;
+
+impl Effect for Cogging {
+    fn card(&self) -> Card {
+        Card {
+            name: "cogging",
+            title: "cogging (torque ripple)",
+            equation: "a sin kNq + b cos kNq",
+            source: "Holtz & Springob 1996",
+            aliases: &[],
+            separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        cx.singles()
+    }
+
+    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
+        super::cogging::orders(cx, place[0])
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let (j, k) = (place[0], shape[0]);
+        vec![
+            Column::on(j, cx.data.own(j, |q, _| (k * q).sin())),
+            Column::on(j, cx.data.own(j, |q, _| (k * q).cos())),
+        ]
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = cx.torque_unit(place[0]);
+        let scale = 1.0;
+        let amplitude = eta[0].hypot(eta[1]);
+        let per = match cx.motion(place[0]) {
+            Motion::Revolute => "rad/rad",
+            Motion::Prismatic => "rad/m",
+        };
+        vec![
+            value(
+                "amplitude",
+                scale * amplitude,
+                scale * std[0].max(std[1]),
+                unit,
+            ),
+            value(
+                "phase",
+                eta[1].atan2(eta[0]),
+                std[0].max(std[1]) / amplitude.max(1e-300),
+                "rad",
+            ),
+            constant("per_position", shape[0], per),
+        ]
+    }
+}
+
+/// Orders `k N` of the motor turn that the records can tell apart from slower terms: whole multiples
+/// where the gear ratio is known, otherwise the orders at which the residual has its highest lines.
+pub(crate) fn orders(cx: &Context, j: usize) -> Vec<Vec<f64>> {
+    let [a, b] = cx.data.range[j];
+    let least = 4.0 * std::f64::consts::PI / (b - a).max(1e-9);
+    if let Some(ratio) = cx.data.plant.actuators()[j].gear_ratio {
+        return (1..=24)
+            .map(|k| k as f64 * ratio.abs())
+            .filter(|k| *k > least)
+            .map(|k| vec![k])
+            .collect();
+    }
+    // residual of the model against position, line by line
+    let fitted = cx.data.fitted;
+    let residual: Vec<f64> = (0..fitted)
+        .map(|i| cx.data.tau[j][i] - cx.model[j][i])
+        .collect();
+    let mut position = Vec::with_capacity(fitted);
+    for r in cx.data.records.iter().filter(|r| r.fit) {
+        position.extend_from_slice(r.state(j).0);
+    }
+    let step = std::f64::consts::PI / (2.0 * (b - a).max(1e-9));
+    const LINES: usize = 400;
+    let mut lines: Vec<(f64, f64)> = (0..LINES)
+        .map(|i| {
+            let k = least + i as f64 * step;
+            let (mut s, mut c) = (0.0, 0.0);
+            for (r, q) in residual.iter().zip(&position).step_by(2) {
+                let (sin, cos) = (k * q).sin_cos();
+                s += r * sin;
+                c += r * cos;
+            }
+            (s * s + c * c, k)
+        })
+        .collect();
+    lines.sort_by(|a, b| b.0.total_cmp(&a.0));
+    lines.truncate(8);
+    lines.into_iter().map(|(_, k)| vec![k]).collect()
+}

@@ -1,0 +1,72 @@
+//! A spring or cylinder that carries part of the weight of the arm.
+
+use super::*;
+
+/// Counterbalance.
+pub struct Counterbalance;
+
+impl Effect for Counterbalance {
+    fn card(&self) -> Card {
+        Card {
+            name: "counterbalance",
+            title: "counterbalance",
+            equation: "a sin q + b cos q, and twice the angle",
+            source: "Klimchik et al. 2013",
+            aliases: &["cable_spring"],
+            separated_by: "poses with and without payload; the pressure of the cylinder",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        if !cx.serial() {
+            return Vec::new();
+        }
+        let robot = cx.data.plant.robot();
+        // only where weight acts
+        (0..cx.data.joints())
+            .filter(|j| cx.motion(*j) == Motion::Revolute && carries(cx, robot, *j))
+            .map(|j| vec![j])
+            .collect()
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+        let j = place[0];
+        let of = |f: fn(f64) -> f64, k: f64| Column::on(j, cx.data.own(j, |q, _| f(k * q)));
+        vec![
+            of(f64::sin, 1.0),
+            of(f64::cos, 1.0),
+            of(f64::sin, 2.0),
+            of(f64::cos, 2.0),
+        ]
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        _shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = cx.torque_unit(place[0]);
+        let names = ["sine", "cosine", "sine_twice", "cosine_twice"];
+        (0..4)
+            .map(|k| value(names[k], eta[k], std[k], unit))
+            .collect()
+    }
+}
+
+/// Whether gravity acts on the links after a joint about its axis.
+fn carries(cx: &Context, robot: &crate::Robot, j: usize) -> bool {
+    let mut x = Samples::zeros(robot.dof(), 16);
+    let r = &cx.data.records[0];
+    for k in 0..x.dof {
+        for i in 0..x.count {
+            x.q[k * x.count + i] = r.x.q[k * r.count + i * (r.count - 1) / 15];
+        }
+    }
+    let weight = crate::diagnose::data::rigid(cx.data.plant, &cx.data.parameters, &cx.phi, &x);
+    weight.is_ok_and(|w| {
+        let row = &w[j * x.count..(j + 1) * x.count];
+        row.iter().any(|v| v.abs() > 0.02 * cx.peak[j])
+    })
+}

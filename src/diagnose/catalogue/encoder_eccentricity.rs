@@ -1,0 +1,72 @@
+//! The disc of an encoder runs out of true: its error repeats once a turn.
+
+use super::*;
+
+/// Encoder eccentricity.
+pub struct EncoderEccentricity;
+
+impl Effect for EncoderEccentricity {
+    fn card(&self) -> Card {
+        Card {
+            name: "encoder_eccentricity",
+            title: "encoder eccentricity",
+            equation: "∂τ/∂(q, q̇, q̈) of a sin q + b cos q",
+            source: "Hollerbach & Wampler 1996",
+            aliases: &[],
+            separated_by: "full turns of the joint",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        if !cx.serial() {
+            return Vec::new();
+        }
+        let turns = |j: &usize| cx.motion(*j) == Motion::Revolute;
+        (0..cx.data.joints())
+            .filter(turns)
+            .map(|j| vec![j])
+            .collect()
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+        let j = place[0];
+        let wave = |phase: f64| {
+            cx.displaced(j, move |r, _| {
+                let (q, v) = r.state(j);
+                let a = r.acceleration(j);
+                let value = q.iter().map(|q| (q + phase).sin()).collect();
+                let first = q
+                    .iter()
+                    .zip(v)
+                    .map(|(q, v)| (q + phase).cos() * v)
+                    .collect();
+                let second = (0..r.count)
+                    .map(|i| {
+                        let (s, c) = (q[i] + phase).sin_cos();
+                        c * a[i] - s * v[i] * v[i]
+                    })
+                    .collect();
+                [value, first, second]
+            })
+        };
+        vec![wave(0.0), wave(std::f64::consts::FRAC_PI_2)]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+        eta[0].hypot(eta[1]) < 0.3
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        _shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = cx.position_unit(place[0]);
+        vec![
+            value("sine", eta[0], std[0], unit),
+            value("cosine", eta[1], std[1], unit),
+        ]
+    }
+}

@@ -1,0 +1,82 @@
+//! Two joints share a part of their transmission.
+
+use super::*;
+
+/// Coupling of two joints.
+pub struct JointCoupling;
+
+impl Effect for JointCoupling {
+    fn card(&self) -> Card {
+        Card {
+            name: "joint_coupling",
+            title: "coupling of two joints",
+            equation: "F_v (q̇_j ± q̇_k) + F_c sgn(q̇_j ± q̇_k) + I_a (q̈_j ± q̈_k) on both",
+            source: "Gautier & Janot (Stäubli RX, TX wrists)",
+            aliases: &[],
+            separated_by: "one of the two joints moved with the other still, and both with opposite speed",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        let n = cx.data.joints();
+        if !cx.serial() {
+            return Vec::new();
+        }
+        (1..n)
+            .filter(|k| cx.motion(*k) == cx.motion(k - 1))
+            .map(|k| vec![k - 1, k])
+            .collect()
+    }
+
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        vec![vec![1.0], vec![-1.0]]
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let (j, k, s) = (place[0], place[1], shape[0]);
+        let width = 1e-3 * (cx.data.speed[j] + cx.data.speed[k]);
+        let sum = |r: &Record, of: fn(&Record, usize) -> Vec<f64>| -> Vec<f64> {
+            of(r, j)
+                .iter()
+                .zip(of(r, k))
+                .map(|(a, b)| a + s * b)
+                .collect()
+        };
+        let position = |r: &Record, i: usize| r.state(i).0.to_vec();
+        let velocity = |r: &Record, i: usize| r.state(i).1.to_vec();
+        let acceleration = |r: &Record, i: usize| r.acceleration(i).to_vec();
+        let both = |x: Vec<f64>| Column {
+            rows: vec![(j, x.clone()), (k, x.iter().map(|v| s * v).collect())],
+        };
+        let mut coulomb = Vec::with_capacity(cx.data.rows());
+        for r in &cx.data.records {
+            let (q, v, a) = (sum(r, position), sum(r, velocity), sum(r, acceleration));
+            let f = |_, v| crate::diagnose::data::sign(v, width);
+            crate::diagnose::data::fine(&q, &v, &a, r.dt, f, &mut coulomb);
+        }
+        vec![
+            both(coulomb),
+            both(cx.data.each(|r, _| smooth(&sum(r, velocity)))),
+            both(cx.data.each(|r, _| smooth(&sum(r, acceleration)))),
+        ]
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let [viscous, inertia] = match cx.motion(place[0]) {
+            Motion::Revolute => ["N m s/rad", "kg m^2"],
+            Motion::Prismatic => ["N s/m", "kg"],
+        };
+        vec![
+            value("coulomb", eta[0], std[0], cx.torque_unit(place[0])),
+            value("viscous", eta[1], std[1], viscous),
+            value("inertia", eta[2], std[2], inertia),
+            constant("ratio", shape[0], ""),
+        ]
+    }
+}

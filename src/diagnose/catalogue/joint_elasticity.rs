@@ -1,0 +1,93 @@
+//! The link follows the motor through a spring: `q_link = q − τ_J/K`.
+
+use super::*;
+
+/// Joint elasticity.
+pub struct JointElasticity;
+
+impl Effect for JointElasticity {
+    fn card(&self) -> Card {
+        Card {
+            name: "joint_elasticity",
+            title: "joint elasticity",
+            equation: "∂τ/∂(q, q̇, q̈) (δ, δ̇, δ̈),  M δ̈ + D δ̇ + K δ = −τ_J",
+            source: "Spong 1987; Wernholt & Gunnarsson 2006",
+            aliases: &[],
+            separated_by: "high harmonics, a locked output, or a second encoder",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        if cx.serial() {
+            cx.singles()
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        // natural frequency of the link on its spring, damping ratio, stiffening at the peak load
+        let mut all = Vec::new();
+        for frequency in [5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0] {
+            for damping in [0.02, 0.08] {
+                for cubic in [0.0, 0.5] {
+                    all.push(vec![frequency, damping, cubic]);
+                }
+            }
+        }
+        all
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k < 2
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column> {
+        let j = place[0];
+        let spring = |r: &Record, k: usize| {
+            let span = cx.data.span(k);
+            let (load, mass) = (&cx.rigid[j][span.clone()], &cx.mass[j][j][span]);
+            backlash::fall(load, mass, r.dt, 0.0, shape[0], shape[1], shape[2], r.cycle)
+        };
+        if draft {
+            let mut all = Vec::with_capacity(cx.data.rows());
+            for (k, r) in cx.data.records.iter().enumerate() {
+                all.extend_from_slice(&spring(r, k)[2]);
+            }
+            return vec![cx.inertial(j, &all, false)];
+        }
+        vec![cx.displaced(j, spring)]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+        eta[0] > 0.4 && eta[0] < 2.0
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = match cx.motion(place[0]) {
+            Motion::Revolute => "N m/rad",
+            Motion::Prismatic => "N/m",
+        };
+        // a coefficient that is not 1 is a twist that is larger: a softer spring
+        let j = place[0];
+        let mass = cx.mass[j][j].iter().sum::<f64>() / cx.data.rows() as f64;
+        let k = mass * (2.0 * std::f64::consts::PI * shape[0]).powi(2);
+        vec![
+            value(
+                "stiffness",
+                k / eta[0],
+                k * std[0] / (eta[0] * eta[0]),
+                unit,
+            ),
+            constant("natural_frequency", shape[0], "Hz"),
+            constant("damping_ratio", shape[1], ""),
+            constant("cubic_share", shape[2], ""),
+        ]
+    }
+}

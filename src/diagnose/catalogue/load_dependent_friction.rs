@@ -1,0 +1,57 @@
+//! Friction that grows with the transmitted torque.
+
+use super::*;
+
+/// Load-dependent friction.
+pub struct LoadDependentFriction;
+
+impl Effect for LoadDependentFriction {
+    fn card(&self) -> Card {
+        Card {
+            name: "load_dependent_friction",
+            title: "load-dependent friction",
+            equation: "β |τ_load|^e sgn q̇",
+            source: "Hamon, Gautier, Garrec & Janot 2010; Bittencourt 2010",
+            aliases: &[],
+            separated_by: "the same speed with two payloads",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        cx.singles()
+    }
+
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        [0.7, 1.0, 1.4, 2.0].map(|e| vec![e]).to_vec()
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let j = place[0];
+        let values = cx
+            .sign(j)
+            .iter()
+            .zip(&cx.rigid[j])
+            .map(|(s, load)| s * (load.abs() / cx.peak[j]).powf(shape[0]))
+            .collect();
+        vec![Column::on(j, values)]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+        eta[0] > 0.0
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = cx.torque_unit(place[0]);
+        vec![
+            value("torque_at_reference_load", eta[0], std[0], unit),
+            constant("reference_load", cx.peak[place[0]], unit),
+            constant("exponent", shape[0], ""),
+        ]
+    }
+}

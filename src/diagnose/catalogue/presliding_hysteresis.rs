@@ -1,0 +1,124 @@
+//! Friction that builds up over the displacement since the last reversal.
+
+use super::*;
+
+/// Pre-sliding hysteresis.
+pub struct PreslidingHysteresis;
+
+impl Effect for PreslidingHysteresis {
+    fn card(&self) -> Card {
+        Card {
+            name: "presliding_hysteresis",
+            title: "pre-sliding hysteresis",
+            equation: "F (z − sgn q̇),  ż = q̇/s (1 − z sgn q̇)^n or Maxwell slip",
+            source: "Dahl 1968; Al-Bender, Lampaert & Swevers 2005",
+            aliases: &[],
+            separated_by: "the same reversal at three speeds: a loop of constant width in position is hysteresis, in time a delay",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        cx.singles()
+    }
+
+    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
+        let [a, b] = cx.data.range[place[0]];
+        let grid = ladder(6e-4 * (b - a), 0.15 * (b - a), 9);
+        let with = |form: f64| grid.iter().map(move |s| vec![*s, form]);
+        with(0.0).chain(with(1.0)).chain(with(2.0)).collect()
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k == 0
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let j = place[0];
+        let width = 1e-3 * cx.data.speed[j];
+        let values = cx.data.each(|r, _| {
+            let (q, v) = r.state(j);
+            let a = r.acceleration(j);
+            // the state of the last period is that of the first: run once to settle
+            let mut z = Bristles::new(shape[0], shape[1] as usize, q[0]);
+            let settle = r.cycle.unwrap_or(0);
+            for q in &q[..settle] {
+                z.step(*q);
+            }
+            let values = crate::diagnose::data::fine_values(q, v, a, r.dt, |q, v, _| {
+                z.step(q) - crate::diagnose::data::sign(v, width)
+            });
+            let mut out = Vec::with_capacity(r.count);
+            crate::diagnose::data::from_fine(&values, r.count, &mut out);
+            out
+        });
+        vec![Column::on(j, values)]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+        eta[0] > 0.0
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        vec![
+            value("level", eta[0], std[0], cx.torque_unit(place[0])),
+            constant("presliding", shape[0], cx.position_unit(place[0])),
+        ]
+    }
+}
+
+/// Normalised friction force of bristles, between −1 and 1.
+struct Bristles {
+    /// displacement over which it builds up
+    reach: f64,
+    /// 0 exponential (Dahl), 1 one spring that slips, 2 springs of many strengths
+    form: usize,
+    at: f64,
+    z: [f64; 8],
+}
+
+impl Bristles {
+    fn new(reach: f64, form: usize, at: f64) -> Self {
+        Bristles {
+            reach,
+            form,
+            at,
+            z: [0.0; 8],
+        }
+    }
+
+    fn step(&mut self, q: f64) -> f64 {
+        let d = q - self.at;
+        self.at = q;
+        match self.form {
+            0 => {
+                let s = d.signum();
+                if d != 0.0 {
+                    // dz/dq = (1 − z sgn)/s, exactly over the step
+                    self.z[0] = s + (self.z[0] - s) * (-d.abs() / self.reach).exp();
+                }
+                self.z[0]
+            }
+            1 => {
+                self.z[0] = (self.z[0] + d / self.reach).clamp(-1.0, 1.0);
+                self.z[0]
+            }
+            _ => {
+                let n = self.z.len() as f64;
+                let mut sum = 0.0;
+                for (k, z) in self.z.iter_mut().enumerate() {
+                    // elements slip at displacements from small to twice the mean
+                    let slip = 2.0 * self.reach * (k as f64 + 0.5) / n;
+                    *z = (*z + d / slip).clamp(-1.0, 1.0);
+                    sum += *z;
+                }
+                sum / n
+            }
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Friction that rises towards standstill.
+
+use super::*;
+
+/// Stribeck friction.
+pub struct StribeckFriction;
+
+impl Effect for StribeckFriction {
+    fn card(&self) -> Card {
+        Card {
+            name: "stribeck_friction",
+            title: "Stribeck friction",
+            equation: "(F_s − F_c) e^{−|q̇/v_s|^δ} sgn q̇",
+            source: "Bo & Pavelescu 1982; Armstrong-Hélouvry, Dupont & Canudas de Wit 1994",
+            aliases: &[],
+            separated_by: "slow constant speeds below the Stribeck velocity",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        cx.singles()
+    }
+
+    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
+        let v = cx.data.speed[place[0]];
+        let grid = ladder(0.006 * v, 0.2 * v, 9);
+        let with = |d: f64| grid.iter().map(move |v| vec![*v, d]);
+        with(1.0).chain(with(2.0)).collect()
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k == 0
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let j = place[0];
+        let width = 1e-3 * cx.data.speed[j];
+        let rise = |v: f64| {
+            crate::diagnose::data::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
+        };
+        vec![Column::on(j, cx.data.own(j, |_, v| rise(v)))]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+        eta[0] > 0.0
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        vec![
+            value("rise", eta[0], std[0], cx.torque_unit(place[0])),
+            constant("stribeck_velocity", shape[0], cx.speed_unit(place[0])),
+            constant("exponent", shape[1], ""),
+        ]
+    }
+}

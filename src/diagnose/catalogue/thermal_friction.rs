@@ -1,0 +1,95 @@
+//! Friction that falls (or rises) as the joint warms up.
+
+use super::*;
+
+/// Thermal friction.
+pub struct ThermalFriction;
+
+impl Effect for ThermalFriction {
+    fn card(&self) -> Card {
+        Card {
+            name: "thermal_friction",
+            title: "thermal friction",
+            equation: "(a sgn q̇ + b q̇) f(ϑ),  ϑ̇ = (P/P₀ − ϑ)/T,  f = ϑ or (1 − e^{−cϑ})/c",
+            source: "Bittencourt & Gunnarsson 2012; Simoni et al. 2019",
+            aliases: &[],
+            separated_by: "the same period repeated cold and warm",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        cx.singles()
+    }
+
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        // time constant, whether warmth lasts over records, how far it saturates
+        let mut all = Vec::new();
+        for time in [5.0, 15.0, 40.0, 100.0, 300.0] {
+            for bend in [0.0, 3.0, 8.0] {
+                all.push(vec![time, 1.0, bend]);
+            }
+            all.push(vec![time, 0.0, 0.0]);
+        }
+        all
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k == 0
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let j = place[0];
+        // warmth from the power of friction; it lasts from record to record in the order of the
+        // experiment, or every record starts cold
+        let actuator = cx.data.plant.actuators()[j];
+        let top = cx.data.speed[j];
+        let [_, viscous, coulomb, _] = actuator.terms;
+        let (fc, fv) = match coulomb + viscous > 0.0 {
+            true => (coulomb, viscous * top),
+            false => (1.0, 1.0),
+        };
+        let power = |v: f64| (fc * v.abs() / top + fv * (v / top).powi(2)) / (fc + fv);
+        let mut order: Vec<usize> = (0..cx.data.records.len()).collect();
+        order.sort_by_key(|k| cx.data.records[*k].order);
+        let mut warmth = vec![0.0; cx.data.rows()];
+        let mut warm = 0.0;
+        for k in order {
+            let r = &cx.data.records[k];
+            if shape[1] == 0.0 {
+                warm = 0.0;
+            }
+            let (_, v) = r.state(j);
+            for (to, v) in warmth[cx.data.span(k)].iter_mut().zip(v) {
+                warm += r.dt / shape[0] * (power(*v) - warm);
+                *to = match shape[2] > 0.0 {
+                    true => (1.0 - (-shape[2] * warm).exp()) / shape[2],
+                    false => warm,
+                };
+            }
+        }
+        let times = |x: Vec<f64>| x.iter().zip(&warmth).map(|(x, w)| x * w).collect();
+        vec![
+            Column::on(j, times(cx.sign(j))),
+            Column::on(j, times(cx.data.each(|r, _| r.state(j).1.to_vec()))),
+        ]
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = match cx.motion(place[0]) {
+            Motion::Revolute => "N m s/rad",
+            Motion::Prismatic => "N s/m",
+        };
+        vec![
+            value("coulomb_change", eta[0], std[0], cx.torque_unit(place[0])),
+            value("viscous_change", eta[1], std[1], unit),
+            constant("time_constant", shape[0], "s"),
+            constant("lasts_over_records", shape[1], ""),
+        ]
+    }
+}

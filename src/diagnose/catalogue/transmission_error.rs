@@ -1,0 +1,83 @@
+//! A kinematic error of the gear that repeats with its turn, with the inertia that it shakes.
+
+use super::*;
+
+/// Transmission error.
+pub struct TransmissionError;
+
+impl Effect for TransmissionError {
+    fn card(&self) -> Card {
+        Card {
+            name: "transmission_error",
+            title: "transmission error",
+            equation: "M d²/dt² (a sin kNq + b cos kNq)",
+            source: "Tuttle & Seering 1996; Ghorbel, Gandhi & Alpeter 2001",
+            aliases: &[],
+            separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
+        }
+    }
+    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+        if cx.serial() {
+            cx.singles()
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
+        super::cogging::orders(cx, place[0])
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column> {
+        let (j, k) = (place[0], shape[0]);
+        // second derivative of sin kq: k q̈ cos kq − k² q̇² sin kq; per 1/k² to keep numbers near 1
+        let shaken = |phase: f64| {
+            let mut all = Vec::with_capacity(cx.data.rows());
+            for r in &cx.data.records {
+                let (q, v) = r.state(j);
+                let a = r.acceleration(j);
+                let mut i = 0;
+                let values = crate::diagnose::data::fine_values(q, v, a, r.dt, |q, v, _| {
+                    let a = a[(i / crate::diagnose::data::FINE).min(a.len() - 1)];
+                    i += 1;
+                    a / k * (k * q + phase).cos() - v * v * (k * q + phase).sin()
+                });
+                crate::diagnose::data::from_fine(&values, r.count, &mut all);
+            }
+            cx.inertial(j, &all, draft)
+        };
+        vec![shaken(0.0), shaken(std::f64::consts::FRAC_PI_2)]
+    }
+
+    fn values(
+        &self,
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
+        eta: &[f64],
+        std: &[f64],
+    ) -> Vec<Value> {
+        let unit = cx.position_unit(place[0]);
+        let scale = 1.0 / (shape[0] * shape[0]);
+        let amplitude = eta[0].hypot(eta[1]);
+        let per = match cx.motion(place[0]) {
+            Motion::Revolute => "rad/rad",
+            Motion::Prismatic => "rad/m",
+        };
+        vec![
+            value(
+                "amplitude",
+                scale * amplitude,
+                scale * std[0].max(std[1]),
+                unit,
+            ),
+            value(
+                "phase",
+                eta[1].atan2(eta[0]),
+                std[0].max(std[1]) / amplitude.max(1e-300),
+                "rad",
+            ),
+            constant("per_position", shape[0], per),
+        ]
+    }
+}

@@ -1,0 +1,46 @@
+//! Motion of the platform of a parallel robot from the measured motion of its actuators.
+
+use crate::dynamics::Samples;
+use crate::error::Result;
+use crate::mechanism::Mechanism;
+
+/// Task coordinates at every sample, by forward kinematics from the home pose onwards; velocities
+/// and accelerations from `ẋ = D_a⁺ q̇_a` through central differences of the pose, which is as smooth
+/// as the actuator motion it comes from.
+///
+/// # Errors
+/// Actuator positions that no pose near the one before gives.
+pub fn coordinates(mechanism: &Mechanism, actuators: &Samples) -> Result<Samples> {
+    let (m, n, count) = (mechanism.freedoms(), actuators.dof, actuators.count);
+    let mut out = Samples::zeros(m, count);
+    let mut from = mechanism.home.clone();
+    let mut q = vec![0.0; n];
+    for i in 0..count {
+        for (j, q) in q.iter_mut().enumerate() {
+            *q = actuators.q[j * count + i];
+        }
+        from = mechanism.forward(&q, &from)?.x;
+        for (k, x) in from.iter().enumerate() {
+            out.q[k * count + i] = *x;
+        }
+    }
+    // ẋ and ẍ from the actuators: with x(q_a) smooth, differentiate along the motion by a step in
+    // time of the actuator motion itself, q(t ± h) ≈ q ± h q̇ + h² q̈ / 2
+    const H: f64 = 1e-4;
+    for i in 0..count {
+        let here: Vec<f64> = (0..m).map(|k| out.q[k * count + i]).collect();
+        let mut sides = Vec::with_capacity(2);
+        for sign in [-1.0, 1.0] {
+            for (j, q) in q.iter_mut().enumerate() {
+                let [p, v, a] = actuators.at(j, i);
+                *q = p + sign * H * v + 0.5 * H * H * a;
+            }
+            sides.push(mechanism.forward(&q, &here)?.x);
+        }
+        for k in 0..m {
+            out.qd[k * count + i] = (sides[1][k] - sides[0][k]) / (2.0 * H);
+            out.qdd[k * count + i] = (sides[1][k] - 2.0 * here[k] + sides[0][k]) / (H * H);
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,123 @@
+//! `diagnosis.json`.
+
+use super::{Diagnosis, Finding};
+use serde_json::{Map, Value, json};
+
+/// A number with five significant digits, `null` where it is not finite.
+fn number(x: f64) -> Value {
+    if !x.is_finite() {
+        return Value::Null;
+    }
+    json!(format!("{x:.4e}").parse::<f64>().unwrap_or(x))
+}
+
+fn numbers(x: &[f64]) -> Value {
+    x.iter().map(|v| number(*v)).collect()
+}
+
+fn finding(f: &Finding) -> Value {
+    let mut parameters = Map::new();
+    for v in &f.values {
+        parameters.insert(
+            v.name.to_string(),
+            json!({ "value": number(v.value), "std": v.std.map(number), "unit": v.unit }),
+        );
+    }
+    json!({
+        "effect": f.effect,
+        "joints": f.joints,
+        "confidence": number(f.confidence),
+        "explains": number(f.explains),
+        "explains_interval": numbers(&f.interval),
+        "holdout_shrink": number(f.holdout),
+        "visibility": number(f.visibility),
+        "parameters": parameters,
+        "indistinguishable_from": f.same,
+        "in_the_set": f.member,
+        "seen_in": if f.frozen { "frozen" } else { "refit" },
+        "equation": f.equation,
+        "separated_by": f.separated_by,
+    })
+}
+
+/// The file, with the keys of `docs/formats.md`.
+pub fn json(d: &Diagnosis, seconds: f64) -> Value {
+    // the gap that is diagnosed: after a refit, unless all of it hides in the parameters
+    let frozen = d.findings.iter().any(|f| f.member && f.frozen);
+    let gaps = if frozen { &d.frozen } else { &d.refit };
+    let rms = |of: &dyn Fn(usize) -> f64| -> f64 {
+        let n = gaps.len() as f64;
+        ((0..gaps.len()).map(|j| of(j).powi(2)).sum::<f64>() / n).sqrt()
+    };
+    let total = rms(&|j| gaps[j].rms);
+    let part = |share: Option<f64>| share.map(|s| number(total * s.max(0.0).sqrt()));
+    let joints: Vec<Value> = (0..gaps.len())
+        .map(|j| {
+            json!({
+                "joint": d.joints[j],
+                "rms": number(gaps[j].rms),
+                "noise": number(gaps[j].noise),
+                "share": number(gaps[j].share),
+                "relative": number(gaps[j].relative),
+                "frozen_rms": number(d.frozen[j].rms),
+                "refit_rms": number(d.refit[j].rms),
+                "explained_rms": number(d.explained[j].rms),
+                "frozen_relative": number(d.frozen[j].relative),
+                "refit_relative": number(d.refit[j].relative),
+                "explained_relative": number(d.explained[j].relative),
+                "unit": d.units[j],
+            })
+        })
+        .collect();
+    let records: Vec<Value> = d
+        .records
+        .iter()
+        .map(|r| {
+            let of = |i: usize| -> Value { r.joints.iter().map(|v| number(v[i])).collect() };
+            json!({
+                "record": r.name,
+                "use": if r.fit { "fit" } else { "holdout" },
+                "repeats": r.repeats,
+                "frozen": of(0),
+                "refit": of(1),
+                "explained": of(2),
+                "remarks": r.remarks,
+            })
+        })
+        .collect();
+    let mut out = json!({
+        "robot": d.robot,
+        "verdict": d.verdict,
+        "gap": {
+            "rms": number(total),
+            "noise": number(rms(&|j| gaps[j].noise)),
+            "mode": if frozen { "frozen" } else { "refit" },
+            "odd": part(d.shares.odd),
+            "even": part(d.shares.even),
+            "non_periodic": part(d.shares.non_periodic),
+            "noise_from": d.noise_source,
+            "any_function_of_the_state": d.bound.map(number),
+            "joints": joints,
+        },
+        "findings": d.findings.iter().map(finding).collect::<Vec<_>>(),
+        "unexplained": number(d.unexplained),
+        "holdout_shrink": number(1.0 - d.holdout[1] / d.holdout[0].max(1e-9)),
+        "records": records,
+        "untestable": d.untestable.iter().map(|(effect, place, v)| json!({
+            "effect": effect, "joints": place, "visibility": number(*v),
+        })).collect::<Vec<_>>(),
+        "prior_surprise": numbers(&d.surprise),
+        "torque_window": number(d.window),
+        "warnings": d.warnings,
+        "seconds": number(seconds),
+    });
+    if let Some(n) = &d.next {
+        out["next_experiment"] = json!({
+            "separates": n.separates,
+            "trajectory": "next.json",
+            "overlap": numbers(&n.overlap),
+            "why": n.why,
+        });
+    }
+    out
+}

@@ -1,0 +1,270 @@
+//! Noise of the measured torque, and the filters that make it white.
+//!
+//! The spectrum `S_τ(f)` of the noise of each actuator comes from the scatter between periods of a
+//! repeating motion; slow changes (below [`SLOW`]) count as a gap and not as noise, so the spectrum is
+//! continued flat below. To it comes what the resolution of the positions leaves unknown of the
+//! acceleration, `Σ_k M_jk² (2πf)⁴ S_q,k(f)`, but never more than the residual of the refitted model
+//! shows. A linear predictor of that spectrum (Levinson-Durbin) whitens every signal and every column
+//! alike, so that all tests count independent samples (Pintelon & Schoukens 2012, ch. 9).
+
+use super::record::Record;
+use std::f64::consts::PI;
+
+/// Frequency below which differences between periods are not noise, Hz.
+pub const SLOW: f64 = 4.0;
+/// Order of the whitening filters.
+pub const ORDER: usize = 12;
+/// Lines of a spectrum between 0 and half the sampling rate.
+pub const LINES: usize = 128;
+
+/// One-sided power of a signal on [`LINES`]` + 1` lines, such that their mean is its variance.
+pub fn spectrum(x: &[f64]) -> Vec<f64> {
+    let n = 2 * LINES;
+    let mut out = vec![0.0; LINES + 1];
+    if x.len() < n {
+        let power = x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64;
+        out.fill(power);
+        return out;
+    }
+    let window: Vec<f64> = (0..n)
+        .map(|i| (PI * (i as f64 + 0.5) / n as f64).sin())
+        .collect();
+    let turn: Vec<(f64, f64)> = (0..n)
+        .map(|i| (2.0 * PI * i as f64 / n as f64).sin_cos())
+        .collect();
+    let segments = (x.len() - n) / (n / 2) + 1;
+    for s in 0..segments {
+        let piece: Vec<f64> = x[s * n / 2..][..n]
+            .iter()
+            .zip(&window)
+            .map(|(a, w)| a * w)
+            .collect();
+        for (l, out) in out.iter_mut().enumerate() {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (i, v) in piece.iter().enumerate() {
+                let (sin, cos) = turn[i * l % n];
+                re += v * cos;
+                im += v * sin;
+            }
+            *out += 2.0 * (re * re + im * im) / (n * segments) as f64;
+        }
+    }
+    out
+}
+
+/// Residual with the mean over periods taken away, scaled to the variance of one sample; `None`
+/// where the record does not repeat.
+pub fn between_periods(record: &Record, x: &[f64]) -> Option<Vec<f64>> {
+    let cycle = record.cycle?;
+    let periods = record.periods();
+    let scale = (periods as f64 / (periods - 1) as f64).sqrt();
+    let mean = period_mean(x, cycle);
+    Some(
+        x.iter()
+            .enumerate()
+            .map(|(i, v)| scale * (v - mean[i % cycle]))
+            .collect(),
+    )
+}
+
+/// Mean period of a signal.
+pub fn period_mean(x: &[f64], cycle: usize) -> Vec<f64> {
+    let periods = x.len() / cycle;
+    (0..cycle)
+        .map(|i| (0..periods).map(|p| x[p * cycle + i]).sum::<f64>() / periods as f64)
+        .collect()
+}
+
+/// Where the noise came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// repeated periods
+    Periods,
+    /// what the residual holds above the band of the motion
+    HighBand,
+}
+
+/// Noise of one actuator for one sampling interval.
+#[derive(Debug, Clone)]
+pub struct Noise {
+    /// spectrum of the torque noise alone
+    pub torque: Vec<f64>,
+    /// whitening filter `x_i − Σ a_k x_{i−k}`, divided by the innovation's deviation
+    pub filter: Vec<f64>,
+    /// standard deviation of the torque noise, N m
+    pub std: f64,
+    /// origin
+    pub source: Source,
+    /// power that unresolved acceleration adds, in units of the noise variance
+    pub excess: f64,
+}
+
+/// Flat continuation below [`SLOW`] of a spectrum of noise between periods.
+fn flat_below(s: &mut [f64], dt: f64) {
+    let of = |f: f64| ((f * 2.0 * dt) * LINES as f64).round() as usize;
+    let (a, b) = (of(SLOW).min(LINES), of(3.0 * SLOW).clamp(2, LINES));
+    if a + 1 >= b {
+        return;
+    }
+    let mut band = s[a..=b].to_vec();
+    band.sort_by(f64::total_cmp);
+    let level = band[band.len() / 2];
+    for v in &mut s[..a] {
+        *v = v.min(level).max(0.5 * level);
+    }
+    // single lines that stand out are a disturbance with a frequency of its own
+    for k in a..=LINES {
+        let (lo, hi) = (k.saturating_sub(6).max(a), (k + 6).min(LINES));
+        let mut near = s[lo..=hi].to_vec();
+        near.sort_by(f64::total_cmp);
+        let middle = near[near.len() / 2];
+        if s[k] > 4.0 * middle {
+            s[k] = middle;
+        }
+    }
+}
+
+impl Noise {
+    /// From signals that hold nothing but noise: differences between periods.
+    pub fn from_periods(parts: &[(Vec<f64>, f64)]) -> Self {
+        let mut s = vec![0.0; LINES + 1];
+        let mut weight = 0.0;
+        for (x, _) in parts {
+            for (s, v) in s.iter_mut().zip(spectrum(x)) {
+                *s += v * x.len() as f64;
+            }
+            weight += x.len() as f64;
+        }
+        s.iter_mut().for_each(|v| *v /= weight);
+        flat_below(&mut s, parts[0].1);
+        Self::new(s, Source::Periods)
+    }
+
+    /// No more than the robot file states: what is beyond is not noise but a gap that does not repeat.
+    pub fn limit(&mut self, stated: Option<f64>) {
+        let Some(stated) = stated.filter(|s| *s > 0.0 && self.std > 1.5 * s) else {
+            return;
+        };
+        let scale = (stated / self.std).powi(2);
+        self.torque.iter_mut().for_each(|v| *v *= scale);
+        self.std = stated;
+        self.filter = predictor(&self.torque);
+    }
+
+    /// From a residual: its power above `band`, taken as flat below.
+    pub fn from_residual(x: &[f64], dt: f64, band: f64) -> Self {
+        let mut s = spectrum(x);
+        let from = ((band * 2.0 * dt * LINES as f64).ceil() as usize).min(LINES - 8);
+        let mut high = s[from..LINES].to_vec();
+        high.sort_by(f64::total_cmp);
+        let level = high[high.len() / 2];
+        s[..from].fill(level);
+        Self::new(s, Source::HighBand)
+    }
+
+    fn new(mut torque: Vec<f64>, source: Source) -> Self {
+        let power = torque.iter().sum::<f64>() / torque.len() as f64;
+        for v in &mut torque {
+            *v = v.max(1e-3 * power).max(1e-300);
+        }
+        let mut noise = Noise {
+            std: power.sqrt(),
+            filter: Vec::new(),
+            torque,
+            source,
+            excess: 0.0,
+        };
+        noise.filter = predictor(&noise.torque);
+        noise
+    }
+
+    /// Whitening filter for the noise and an excess on top of it.
+    pub fn with_excess(&mut self, excess: &[f64]) {
+        let s: Vec<f64> = self.torque.iter().zip(excess).map(|(a, b)| a + b).collect();
+        self.filter = predictor(&s);
+        self.excess = excess.iter().sum::<f64>() / excess.len() as f64 / self.std.powi(2);
+    }
+
+    /// A signal of one record, whitened; the first [`ORDER`] samples are zero.
+    pub fn whiten(&self, x: &[f64], out: &mut Vec<f64>) {
+        let skip = (self.filter.len() - 1).min(x.len());
+        out.extend(std::iter::repeat_n(0.0, skip));
+        for i in skip..x.len() {
+            let mut sum = 0.0;
+            for (k, f) in self.filter.iter().enumerate() {
+                sum += f * x[i - k];
+            }
+            out.push(sum);
+        }
+    }
+}
+
+impl Noise {
+    /// Undoes [`Noise::whiten`] of one record (but for its first samples, which are taken as zero), in
+    /// units of the noise's standard deviation.
+    pub fn unwhiten(&self, e: &[f64], out: &mut Vec<f64>) {
+        let at = out.len();
+        for i in 0..e.len() {
+            let mut sum = e[i];
+            for k in 1..self.filter.len().min(i + 1) {
+                sum -= self.filter[k] * out[at + i - k];
+            }
+            out.push(sum / self.filter[0]);
+        }
+        out[at..].iter_mut().for_each(|v| *v /= self.std);
+    }
+}
+
+/// Levinson-Durbin recursion on the autocorrelation of a spectrum: `[1, −a_1, …]/σ`.
+fn predictor(s: &[f64]) -> Vec<f64> {
+    let n = s.len() - 1;
+    let correlation: Vec<f64> = (0..=ORDER)
+        .map(|lag| {
+            (0..=n)
+                .map(|l| {
+                    let w = if l == 0 || l == n { 0.5 } else { 1.0 };
+                    w * s[l] * (PI * (lag * l) as f64 / n as f64).cos()
+                })
+                .sum::<f64>()
+                / n as f64
+        })
+        .collect();
+    let mut a = vec![1.0];
+    let mut error = correlation[0] * (1.0 + 1e-9);
+    for m in 1..=ORDER {
+        let k = -(0..m).map(|i| a[i] * correlation[m - i]).sum::<f64>() / error;
+        a.push(0.0);
+        let old = a.clone();
+        for i in 1..=m {
+            a[i] = old[i] + k * old[m - i];
+        }
+        error *= 1.0 - k * k;
+    }
+    let scale = 1.0 / error.max(1e-300).sqrt();
+    a.iter().map(|v| v * scale).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coloured_noise_becomes_white() {
+        use rand::{Rng, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut x = vec![0.0; 20_000];
+        for i in 1..x.len() {
+            let e: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+            x[i] = 0.8 * x[i - 1] + e;
+        }
+        let noise = Noise::new(spectrum(&x), Source::Periods);
+        let mut w = Vec::new();
+        noise.whiten(&x, &mut w);
+        let power =
+            |lag: usize| w[lag..].iter().zip(&w).map(|(a, b)| a * b).sum::<f64>() / w.len() as f64;
+        assert!((power(0) - 1.0).abs() < 0.05, "{}", power(0));
+        assert!(power(1).abs() < 0.05 && power(2).abs() < 0.05);
+        // variance of the process: 1/(1 − 0.64)
+        assert!((noise.std - (1.0f64 / 0.36).sqrt()).abs() < 0.08);
+    }
+}

@@ -1,0 +1,476 @@
+//! The report: where the gap lies, what causes it, how far it shrinks, what to run next.
+
+use super::{Diagnosis, Finding, Verdict};
+use crate::report::format::{percent, significant};
+use crate::report::html::{Section, Tone, details, figure, legend, page, table, tiles};
+use crate::report::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape};
+use maud::{Markup, html};
+
+/// Verdict in one sentence.
+pub fn sentence(d: &Diagnosis) -> (Tone, String) {
+    let claims: Vec<&Finding> = claims(d);
+    let names = || -> String {
+        let each = |f: &&Finding| match f.joints.is_empty() {
+            true => f.title.to_string(),
+            false => format!("{} on {}", f.title, f.joints.join(" and ")),
+        };
+        claims.iter().map(each).collect::<Vec<_>>().join("; ")
+    };
+    let left = percent(d.unexplained);
+    match d.verdict {
+        Verdict::NoGap => (
+            Tone::Good,
+            "No gap: what is left after ordinary corrections of the parameters is noise.".into(),
+        ),
+        Verdict::Explained => (
+            Tone::Good,
+            format!("Explained: {}. {left} of the gap stays.", names()),
+        ),
+        Verdict::PartlyExplained => (
+            Tone::Fair,
+            format!(
+                "Partly explained: {}. Something remains: {left} of the gap.",
+                names()
+            ),
+        ),
+        Verdict::Unknown => (
+            Tone::Bad,
+            match d.findings.first().filter(|f| f.confidence > 0.15) {
+                Some(f) => format!(
+                    "Unknown: there is a gap that no effect of the catalogue explains with confidence. The nearest is {} \
+                     ({} sure); see below what could tell.",
+                    f.title,
+                    percent(f.confidence)
+                ),
+                None => {
+                    "Unknown: there is a gap, and no effect of the catalogue explains it.".into()
+                }
+            },
+        ),
+    }
+}
+
+fn claims(d: &Diagnosis) -> Vec<&Finding> {
+    d.findings
+        .iter()
+        .filter(|f| f.member && f.confidence >= 0.5)
+        .collect()
+}
+
+/// The page.
+pub fn html(d: &Diagnosis) -> String {
+    let verdict = sentence(d);
+    let line = format!(
+        "Diagnosis of {} from {} ({} to predict only)",
+        d.robot,
+        crate::report::format::count(d.records.len(), "record"),
+        d.records.iter().filter(|r| !r.fit).count()
+    );
+    let sections = [
+        Section::new("", summary(d)),
+        Section::new("Which effect", effects(d)),
+        Section::new("Where the gap lies", residuals(d)),
+        Section::new("Over velocity, position, torque and time", maps(d)),
+        Section::new("Over frequency", spectra(d)),
+        Section::new("How far it shrinks", shrink(d)),
+        Section::new("What to run next", next(d)),
+        Section::new("What this data cannot say", limits(d)),
+    ];
+    page(
+        &format!("{}: diagnosis", d.robot),
+        &line,
+        (verdict.0, &verdict.1),
+        &sections,
+    )
+}
+
+fn summary(d: &Diagnosis) -> Markup {
+    let worst = (0..d.joints.len())
+        .max_by(|a, b| d.refit[*a].share.total_cmp(&d.refit[*b].share))
+        .unwrap_or(0);
+    let g = &d.refit[worst];
+    let shrink = 1.0 - d.holdout[1] / d.holdout[0].max(1e-9);
+    let share = |s: Option<f64>| s.map_or("–".to_string(), percent);
+    let all = [
+        (
+            format!("{} ×", significant(g.rms / g.noise, 3)),
+            "gap over noise after a refit".into(),
+            format!(
+                "{}: {} {} rms over a noise of {}",
+                g.joint,
+                significant(g.rms, 3),
+                d.units[worst],
+                significant(g.noise, 3)
+            ),
+        ),
+        (
+            percent(shrink.max(0.0)),
+            "of the gap gone on holdout records".into(),
+            "with the effects found, parameters from the fitted records".into(),
+        ),
+        (
+            format!(
+                "{} / {} / {}",
+                share(d.shares.odd),
+                share(d.shares.even),
+                share(d.shares.non_periodic)
+            ),
+            "odd / even / not repeating".into(),
+            match (d.shares.odd, d.shares.non_periodic) {
+                (None, None) => "no record repeats: this cannot be said".into(),
+                (None, _) => "odd and even need a motion of odd harmonics".into(),
+                _ => "shares of the refitted gap".to_string(),
+            },
+        ),
+        (
+            d.bound.map_or("–".into(), percent),
+            "any function of the state could explain".into(),
+            "bins of position and velocity of each joint, tried on other periods".into(),
+        ),
+    ];
+    tiles(&all)
+}
+
+fn values(f: &Finding) -> Markup {
+    html! {
+        @for v in &f.values {
+            div {
+                (v.name.replace('_', " ")) " " (significant(v.value, 4))
+                @if let Some(s) = v.std { @if s > 0.0 { " ± " (significant(1.96 * s, 2)) } }
+                " " (v.unit)
+            }
+        }
+    }
+}
+
+fn effects(d: &Diagnosis) -> Markup {
+    if d.findings.is_empty() {
+        return html! { p { "No effect stands out: " (match d.verdict {
+            Verdict::NoGap => "there is nothing to explain.",
+            _ => "none of the catalogue explains a share of the gap that holds on holdout records.",
+        }) } };
+    }
+    let row = |f: &Finding| {
+        vec![
+            html! {
+                @if f.member && f.confidence >= 0.5 { strong { (f.title) } } @else { (f.title) }
+                div class="code" { (f.equation) }
+            },
+            html! { @if f.joints.is_empty() { "whole robot" } @else { (f.joints.join(", ")) } },
+            html! { (percent(f.confidence)) },
+            html! { (percent(f.explains)) @if f.member { div { small { (percent(f.interval[0])) "–" (percent(f.interval[1])) } } } },
+            html! { (percent(f.holdout)) },
+            html! { (percent(f.visibility)) @if f.frozen { div { small { "against the prior" } } } },
+            values(f),
+            html! { @if f.same.is_empty() { "–" } @else { (f.same.join(", ").replace('_', " ")) } },
+        ]
+    };
+    let head = [
+        "effect",
+        "where",
+        "confidence",
+        "explains",
+        "on holdout",
+        "visible",
+        "parameters (95 %)",
+        "not told from",
+    ];
+    let (set, rest): (Vec<&Finding>, Vec<&Finding>) = d.findings.iter().partition(|f| f.member);
+    html! {
+        p { "An effect is claimed from a confidence of 50 % on. " strong { "Explains" } " is the share of the gap above the \
+            noise that goes when the effect is added to the others; " strong { "visible" } " the share of the effect that the \
+            nominal model cannot absorb by other parameters." }
+        (table(&head, &[1, 6, 7], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
+        @if !rest.is_empty() {
+            (details("Rivals: what else could stand in their place", table(&head, &[1, 6, 7],
+                &rest.iter().map(|f| row(f)).collect::<Vec<_>>())))
+        }
+    }
+}
+
+fn unit(label: &str, unit: &str) -> String {
+    format!("{label}, {}", unit.replace(' ', "\u{a0}"))
+}
+
+/// Joints by falling share of the gap, the few that matter.
+fn worst(d: &Diagnosis, most: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..d.joints.len()).collect();
+    all.sort_by(|a, b| d.refit[*b].share.total_cmp(&d.refit[*a].share));
+    all.truncate(most);
+    all
+}
+
+fn residuals(d: &Diagnosis) -> Markup {
+    let panels: Vec<Panel> = (0..d.joints.len())
+        .map(|j| {
+            let t = &d.traces[j];
+            let line = |y: &[f64], colour| {
+                let points = t.t.iter().zip(y).map(|(t, y)| [*t, *y]).collect();
+                Series::line(points, colour)
+            };
+            let noise = d.refit[j].noise;
+            let level = |at: f64, label: &str| Rule {
+                at,
+                upright: false,
+                colour: Colour::GREY,
+                label: label.into(),
+            };
+            Panel {
+                title: d.joints[j].clone(),
+                note: format!("{} of the gap", percent(d.refit[j].share)),
+                x: Axis::linear("time, s"),
+                y: Axis::linear(unit("residual", d.units[j])),
+                rules: vec![level(2.0 * noise, "2σ noise"), level(-2.0 * noise, "")],
+                series: vec![
+                    line(&t.before, Colour::BLUE),
+                    line(&t.after, Colour::ORANGE),
+                ],
+                ..Panel::default()
+            }
+        })
+        .collect();
+    let svg = Figure {
+        description: "residual of each joint over a period, before and after".into(),
+        width: Figure::WIDTH,
+        height: 120.0,
+        columns: if d.joints.len() > 1 { 2 } else { 1 },
+        column_titles: Vec::new(),
+        row_titles: Vec::new(),
+        share_x: false,
+        panels,
+    }
+    .svg();
+    let rows: Vec<Vec<Markup>> = (0..d.joints.len())
+        .map(|j| {
+            let cell = |g: &super::JointGap| {
+                html! { (significant(g.rms, 3)) " " (d.units[j])
+                div { small { (percent(g.relative)) " of the torque, " (significant(g.rms / g.noise, 2)) " × noise" } } }
+            };
+            vec![
+                html! { (d.joints[j]) },
+                html! { (significant(d.refit[j].noise, 3)) " " (d.units[j]) },
+                cell(&d.frozen[j]),
+                cell(&d.refit[j]),
+                cell(&d.explained[j]),
+                html! { (percent(d.refit[j].share)) },
+            ]
+        })
+        .collect();
+    html! {
+        (figure(svg, html! {
+            (legend(&[(Colour::BLUE, Shape::Line, "refitted nominal model"), (Colour::ORANGE, Shape::Line, "with the effects found")]))
+            "Mean over the periods of the first fitted record."
+        }))
+        (table(&["joint", "noise", "frozen model", "refitted", "with the effects", "share"], &[], &rows))
+        p { "rms above the noise over the fitted records. The noise floor comes from " (d.noise_source) ". The refit moves the \
+            nominal parameters within what is ordinary for a model of this origin (its prior)." }
+    }
+}
+
+fn maps(d: &Diagnosis) -> Markup {
+    let few = worst(d, 3);
+    let mut panels = Vec::new();
+    for &j in &few {
+        let t = &d.traces[j];
+        let step = (t.t.len() / 1500).max(1);
+        let dots = |x: &[f64], y: &[f64], colour| Series {
+            points: x
+                .iter()
+                .zip(y)
+                .step_by(step)
+                .map(|(x, y)| [*x, *y])
+                .collect(),
+            colour,
+            width: 0.8,
+            shape: Shape::Dots,
+        };
+        for (k, (label, x)) in [
+            ("velocity", &t.velocity),
+            ("position", &t.position),
+            ("torque", &t.torque),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let of = if k == 2 { d.units[j] } else { "" };
+            panels.push(Panel {
+                title: if k == 0 {
+                    d.joints[j].clone()
+                } else {
+                    String::new()
+                },
+                x: Axis::linear(if of.is_empty() {
+                    label.to_string()
+                } else {
+                    unit(label, of)
+                }),
+                y: Axis::linear(unit("residual", d.units[j])),
+                series: vec![
+                    dots(x, &t.before, Colour::BLUE),
+                    dots(x, &t.after, Colour::ORANGE),
+                ],
+                ..Panel::default()
+            });
+        }
+        let drift = |k: usize, colour| Series {
+            points: t.drift.iter().map(|p| [p[0], p[k]]).collect(),
+            colour,
+            width: 1.8,
+            shape: Shape::Line,
+        };
+        panels.push(Panel {
+            x: Axis::linear("time over all records, s"),
+            y: Axis::linear(unit("rms of a period", d.units[j])),
+            series: vec![drift(1, Colour::BLUE), drift(2, Colour::ORANGE)],
+            ..Panel::default()
+        });
+    }
+    let svg = Figure {
+        description: "residual over velocity, position, torque and time".into(),
+        width: Figure::WIDTH,
+        height: 150.0,
+        columns: 4,
+        column_titles: Vec::new(),
+        row_titles: Vec::new(),
+        share_x: false,
+        panels,
+    }
+    .svg();
+    figure(
+        svg,
+        html! {
+            (legend(&[(Colour::BLUE, Shape::Dots, "refitted nominal model"), (Colour::ORANGE, Shape::Dots, "with the effects found")]))
+            "The joints with the largest share of the gap, first fitted record (mean period); at the right the course over all records."
+        },
+    )
+}
+
+fn spectra(d: &Diagnosis) -> Markup {
+    let few = worst(d, 3);
+    let panels = few
+        .iter()
+        .map(|&j| {
+            let t = &d.traces[j];
+            let line = |k: usize, colour| {
+                let points = t.spectrum.iter().skip(1).map(|p| [p[0], p[k]]).collect();
+                Series::line(points, colour)
+            };
+            Panel {
+                title: d.joints[j].clone(),
+                x: Axis::linear("frequency, Hz"),
+                y: Axis::log(unit("amplitude", d.units[j])),
+                series: vec![
+                    line(3, Colour::GREY),
+                    line(1, Colour::BLUE),
+                    line(2, Colour::ORANGE),
+                ],
+                ..Panel::default()
+            }
+        })
+        .collect();
+    let svg = Figure {
+        description: "spectrum of the residual before and after".into(),
+        width: Figure::WIDTH,
+        height: 170.0,
+        columns: few.len().max(1),
+        column_titles: Vec::new(),
+        row_titles: Vec::new(),
+        share_x: false,
+        panels,
+    }
+    .svg();
+    figure(
+        svg,
+        html! {
+            (legend(&[(Colour::GREY, Shape::Line, "noise"), (Colour::BLUE, Shape::Line, "refitted nominal model"), (Colour::ORANGE, Shape::Line, "with the effects found")]))
+        },
+    )
+}
+
+fn shrink(d: &Diagnosis) -> Markup {
+    let rows: Vec<Vec<Markup>> = d
+        .records
+        .iter()
+        .map(|r| {
+            let mean = |i: usize| {
+                let n = r.joints.len() as f64;
+                (r.joints.iter().map(|v| v[i]).sum::<f64>() / n).sqrt()
+            };
+            let [a, b, c] = [mean(0), mean(1), mean(2)];
+            let share = if b > 0.0 { 1.0 - (c / b).powi(2) } else { 0.0 };
+            vec![
+                html! { (r.name) @for remark in &r.remarks { div { small { (remark) } } } },
+                html! { (if r.fit { "fit" } else { "holdout" }) },
+                html! { (significant(a, 3)) },
+                html! { (significant(b, 3)) },
+                html! { (significant(c, 3)) },
+                html! { (percent(share.max(0.0))) },
+            ]
+        })
+        .collect();
+    let mut total = 0.0;
+    let steps: Vec<Vec<Markup>> = d
+        .findings
+        .iter()
+        .filter(|f| f.member)
+        .map(|f| {
+            total += f.holdout;
+            vec![
+                html! { (f.title) },
+                html! { (percent(f.explains)) },
+                html! { (percent(f.holdout)) },
+                html! { (percent(total.clamp(0.0, 1.0))) },
+            ]
+        })
+        .collect();
+    html! {
+        p { "Gap of all joints in multiples of their noise (root of the mean energy above the noise), record by record. Holdout records were \
+            not fitted to." }
+        (table(&["record", "use", "frozen", "refitted", "with the effects", "of the energy gone"], &[1], &rows))
+        @if !steps.is_empty() {
+            h3 { "Effect by effect" }
+            (table(&["effect", "of the fitted gap", "of the holdout gap", "sum on holdout"], &[], &steps))
+        }
+    }
+}
+
+fn next(d: &Diagnosis) -> Markup {
+    html! {
+        @match &d.next {
+            Some(n) => {
+                p { (n.why) "." }
+                p { "The motion is in " code { "next.json" } ": period " (significant(n.trajectory.fourier.period, 3)) " s, run "
+                    (n.trajectory.periods) " times. Overlap " (percent(n.overlap[0])) " in the present records, " (percent(n.overlap[1]))
+                    " predicted." }
+            }
+            None => {
+                p { @if d.findings.iter().any(|f| f.member && f.confidence >= 0.5) {
+                    "The effects that are claimed are told apart from their rivals by the records at hand."
+                } @else { "No pair of effects is near enough to the gap to be worth separating." } }
+            }
+        }
+        @for f in d.findings.iter().filter(|f| f.member && !f.same.is_empty()) {
+            p { "To tell " (f.title) " from " (f.same.join(", ").replace('_', " ")) ": " (f.separated_by) "." }
+        }
+    }
+}
+
+fn limits(d: &Diagnosis) -> Markup {
+    html! {
+        @if d.untestable.is_empty() {
+            p { "Every effect of the catalogue shows in this motion by more than one percent." }
+        } @else {
+            p { "The nominal model absorbs more than 99 % of these effects in this motion. They are untestable here, not absent:" }
+            (details("Untestable effects", table(&["effect", "where", "visible"], &[1],
+                &d.untestable.iter().map(|(e, p, v)| vec![
+                    html! { (e.replace('_', " ")) },
+                    html! { @if p.is_empty() { "whole robot" } @else { (p) } },
+                    html! { (percent(*v)) },
+                ]).collect::<Vec<_>>())))
+        }
+        @if !d.warnings.is_empty() {
+            h3 { "Warnings" }
+            ul { @for w in &d.warnings { li { (w.to_string()) } } }
+        }
+    }
+}

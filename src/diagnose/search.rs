@@ -1,0 +1,176 @@
+//! Search over effects, places and shapes.
+
+use super::catalogue::{Context, Effect};
+use super::evidence::{Evidence, Fit, Projected};
+use rayon::prelude::*;
+
+/// An effect at a place with its best shape.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// index into the catalogue
+    pub effect: usize,
+    /// actuators
+    pub place: Vec<usize>,
+    /// shape constants
+    pub shape: Vec<f64>,
+    /// columns
+    pub projected: Projected,
+    /// by how much `J` falls when it is added to what is already there
+    pub gain: f64,
+    /// coefficients then
+    pub eta: Vec<f64>,
+}
+
+impl Candidate {
+    /// Parameters that were fitted: coefficients and shape constants.
+    pub fn freedoms(&self) -> usize {
+        self.eta.len() + self.shape.len()
+    }
+
+    /// Whether it is the same effect at the same place.
+    pub fn same(&self, other: &Candidate) -> bool {
+        self.effect == other.effect && self.place == other.place
+    }
+}
+
+/// Gain of one shape beside a fitted set.
+fn try_shape(
+    evidence: &Evidence,
+    cx: &Context,
+    effect: &dyn Effect,
+    place: &[usize],
+    shape: &[f64],
+    beside: &[&Projected],
+    before: &Fit,
+    draft: bool,
+) -> Option<(f64, Vec<f64>, Projected)> {
+    let columns = effect.columns(cx, place, shape, draft);
+    if columns.is_empty() || columns.iter().any(|c| c.rows.is_empty()) {
+        return None;
+    }
+    let projected = evidence.project(&columns);
+    let mut set = beside.to_vec();
+    set.push(&projected);
+    let fit = evidence.fit(&set);
+    let eta = fit.eta[fit.eta.len() - columns.len()..].to_vec();
+    let gain = fit.gain - before.gain;
+    let gain = match gain.is_finite() && effect.plausible(cx, place, shape, &eta) {
+        true => gain,
+        false => 0.0,
+    };
+    Some((gain, eta, projected))
+}
+
+/// The best shape of an effect at a place, beside a set.
+pub fn best_shape(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    which: usize,
+    place: &[usize],
+    beside: &[&Projected],
+    before: &Fit,
+) -> Option<Candidate> {
+    let effect = effects[which].as_ref();
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for shapes in effect.shapes(cx, place).chunks(8) {
+        let sets: Vec<_> = shapes
+            .iter()
+            .map(|s| effect.columns(cx, place, s, true))
+            .collect();
+        if sets
+            .iter()
+            .any(|s| s.is_empty() || s.iter().any(|c| c.rows.is_empty()))
+        {
+            continue;
+        }
+        for (projected, shape) in evidence.project_all(&sets).iter().zip(shapes) {
+            let mut set = beside.to_vec();
+            set.push(projected);
+            let fit = evidence.fit(&set);
+            let eta = &fit.eta[fit.eta.len() - projected.z.len()..];
+            let gain = fit.gain - before.gain;
+            if gain.is_finite()
+                && effect.plausible(cx, place, shape, eta)
+                && best.as_ref().is_none_or(|b| gain > b.0)
+            {
+                best = Some((gain, shape.clone()));
+            }
+        }
+    }
+    let (gain, mut shape) = best?;
+    // between grid points
+    if gain > 20.0 {
+        let mut top = gain;
+        let grid = effect.shapes(cx, place);
+        let bounds: Vec<[f64; 2]> = (0..shape.len())
+            .map(|k| {
+                let ends = grid
+                    .iter()
+                    .map(|s| s[k])
+                    .filter(|v| v.signum() == shape[k].signum());
+                ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+                    [a.min(v.abs()), b.max(v.abs())]
+                })
+            })
+            .collect();
+        for step in [1.3f64, 1.12, 1.05] {
+            for k in 0..shape.len() {
+                if !effect.refinable(k) {
+                    continue;
+                }
+                for factor in [step, 1.0 / step] {
+                    loop {
+                        let mut next = shape.clone();
+                        next[k] *= factor;
+                        if next[k].abs() < bounds[k][0] / 1.5 || next[k].abs() > bounds[k][1] * 1.2
+                        {
+                            break;
+                        }
+                        let tried =
+                            try_shape(evidence, cx, effect, place, &next, beside, before, true);
+                        match tried {
+                            Some((gain, ..)) if gain > top * 1.0005 => {
+                                top = gain;
+                                shape = next;
+                            }
+                            _ => break,
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let (gain, eta, projected) =
+        try_shape(evidence, cx, effect, place, &shape, beside, before, false)?;
+    Some(Candidate {
+        effect: which,
+        place: place.to_vec(),
+        shape,
+        projected,
+        gain,
+        eta,
+    })
+}
+
+/// Every effect at every place with its best shape, beside a set; by falling gain.
+pub fn singles(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    beside: &[&Projected],
+) -> Vec<Candidate> {
+    let before = evidence.fit(beside);
+    let tasks: Vec<(usize, Vec<usize>)> = effects
+        .iter()
+        .enumerate()
+        .flat_map(|(e, effect)| effect.places(cx).into_iter().map(move |p| (e, p)))
+        .collect();
+    let mut all: Vec<Candidate> = tasks
+        .par_iter()
+        .with_max_len(1)
+        .filter_map(|(e, place)| best_shape(evidence, cx, effects, *e, place, beside, &before))
+        .collect();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    all
+}

@@ -1,0 +1,596 @@
+//! From evidence to a verdict: which effects are there, how sure that is, and what they leave.
+//!
+//! 1. The set of effects grows forwards; each step tries every effect at every place beside those found,
+//!    improves the shapes of all, and is also compared with the best of all pairs (two effects may mask
+//!    each other). A step must explain a share of the gap that stands out on the records *not* fitted to.
+//! 2. Every member of the set is challenged: with the others kept, each rival takes its place with its
+//!    best shape. A rival that loses little more than the member is indistinguishable from it, and the
+//!    two share the confidence.
+//! 3. The confidence of a member is the product of what it explains of that which only it can explain on
+//!    its joints, of how that holds on holdout records, and of its share against its rivals.
+
+use super::catalogue::{Context, Effect};
+use super::evidence::{Evidence, Fit, Projected};
+use super::gap;
+use super::search::{Candidate, best_shape};
+use rayon::prelude::*;
+
+/// What became of a rival.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    /// index into the catalogue
+    pub effect: usize,
+    /// where
+    pub place: Vec<usize>,
+    /// share of the member's gain that it loses
+    pub loss: f64,
+    /// weight relative to the member
+    pub weight: f64,
+    /// shape constants
+    pub shape: Vec<f64>,
+    /// coefficients
+    pub eta: Vec<f64>,
+}
+
+/// One effect of the set.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// effect, place, shape
+    pub candidate: Candidate,
+    /// 0 to 1
+    pub confidence: f64,
+    /// share of the gap on fitted records
+    pub explains: f64,
+    /// interval of it
+    pub interval: [f64; 2],
+    /// share of the gap on holdout records
+    pub holdout: f64,
+    /// share of the effect's energy that the nominal model cannot absorb
+    pub visibility: f64,
+    /// rivals by falling weight
+    pub rivals: Vec<Rival>,
+    /// standard deviations of the coefficients
+    pub std: Vec<f64>,
+    /// whether it shows in the parameters that the nominal model would need rather than in a residual
+    pub frozen: bool,
+}
+
+/// Verdict of a diagnosis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// nothing above noise and ordinary parameter errors
+    NoGap,
+    /// named effects explain it
+    Explained,
+    /// named effects explain part of it
+    PartlyExplained,
+    /// no effect of the catalogue explains it
+    Unknown,
+}
+
+/// Result of the search.
+pub struct Decision {
+    /// verdict
+    pub verdict: Verdict,
+    /// effects by falling confidence
+    pub members: Vec<Member>,
+    /// fit of all of them together
+    pub fit: Fit,
+    /// gap energy of the refitted nominal model on fitted records, by actuator, noise variances
+    pub before: Vec<f64>,
+    /// the same with the set
+    pub after: Vec<f64>,
+    /// gap energy on holdout records before and after
+    pub holdout: [f64; 2],
+    /// what the prior says against the refitted parameters, before and after
+    pub surprise: [f64; 2],
+    /// share of the gap that stays
+    pub unexplained: f64,
+}
+
+/// Gain that an effect must bring, per row of a joint, in noise variances.
+const LEAST: f64 = 0.06;
+/// Gap per row below which there is none: what windows, encoders and the shape of friction at
+/// reversals leave of a sound model.
+const SOUND: f64 = 0.25;
+/// Imperfection of a sound model, per row, that counts neither for nor against an effect.
+const SLACK: f64 = 0.05;
+/// Gain of prior plausibility above which parameters are not ordinary errors.
+const SURPRISE: f64 = 45.0;
+
+struct State<'a> {
+    evidence: &'a Evidence<'a>,
+    cx: &'a Context<'a>,
+    effects: &'a [Box<dyn Effect>],
+}
+
+impl State<'_> {
+    fn fit(&self, set: &[Candidate]) -> (Fit, Vec<Vec<f64>>) {
+        let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
+        let fit = self.evidence.fit(&set);
+        let residual = self.evidence.residual(&set, &fit);
+        (fit, residual)
+    }
+
+    /// Gap by actuator on fitted records.
+    fn gap(&self, residual: &[Vec<f64>], fitted: bool) -> Vec<f64> {
+        let plain = self.evidence.unwhitened(residual);
+        gap::energies(self.evidence.data, &plain, |r| r.fit == fitted)
+            .into_iter()
+            .map(|[a, b]| a + b)
+            .collect()
+    }
+
+    /// Penalty of the prior with a set.
+    fn surprise(&self, fit: &Fit, residual: &[Vec<f64>]) -> f64 {
+        let fitted = self.evidence.data.fitted;
+        let chi: f64 = residual
+            .iter()
+            .map(|e| e[..fitted].iter().map(|v| v * v).sum::<f64>())
+            .sum();
+        self.evidence.j0 - fit.gain - chi
+    }
+
+    /// Joints on whose rows an effect acts most.
+    fn joints_of(&self, c: &Candidate) -> Vec<usize> {
+        if c.place.is_empty() {
+            return (0..self.evidence.data.joints()).collect();
+        }
+        c.place.clone()
+    }
+
+    /// Improves the shapes of all members in turn.
+    fn polish(&self, set: &mut Vec<Candidate>) {
+        for i in 0..set.len() {
+            let others: Vec<Candidate> = others(set, i);
+            let beside: Vec<&Projected> = others.iter().map(|c| &c.projected).collect();
+            let before = self.evidence.fit(&beside);
+            let (effect, place) = (set[i].effect, set[i].place.clone());
+            let better = best_shape(
+                self.evidence,
+                self.cx,
+                self.effects,
+                effect,
+                &place,
+                &beside,
+                &before,
+            );
+            if let Some(b) = better.filter(|b| b.gain > 0.0) {
+                set[i] = b;
+            }
+        }
+    }
+
+    /// Rivals of a place in the set with their best shapes, by falling gain beside the others.
+    fn challengers(
+        &self,
+        list: &[Candidate],
+        beside: &[&Projected],
+        most: usize,
+    ) -> Vec<Candidate> {
+        let before = self.evidence.fit(beside);
+        let mut quick: Vec<(f64, usize)> = list
+            .par_iter()
+            .enumerate()
+            .map(|(i, c)| {
+                let mut set = beside.to_vec();
+                set.push(&c.projected);
+                (self.evidence.fit(&set).gain - before.gain, i)
+            })
+            .collect();
+        quick.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        // the best places of every effect
+        let mut chosen: Vec<usize> = Vec::new();
+        for (_, i) in &quick {
+            let same = chosen
+                .iter()
+                .filter(|c| list[**c].effect == list[*i].effect);
+            if same.count() < 2 && chosen.len() < most {
+                chosen.push(*i);
+            }
+        }
+        let mut all: Vec<Candidate> = chosen
+            .par_iter()
+            .with_max_len(1)
+            .filter_map(|i| {
+                let c = &list[*i];
+                best_shape(
+                    self.evidence,
+                    self.cx,
+                    self.effects,
+                    c.effect,
+                    &c.place,
+                    beside,
+                    &before,
+                )
+            })
+            .filter(|c| c.gain > 0.0)
+            .collect();
+        all.sort_by(|a, b| self.merit(b).total_cmp(&self.merit(a)));
+        all
+    }
+
+    /// Gain less what its freedoms cost, a little more for effects that are always expected.
+    fn merit(&self, c: &Candidate) -> f64 {
+        let name = self.effects[c.effect].card().name;
+        let n = (self.evidence.data.fitted * self.evidence.data.joints()) as f64;
+        let cost = c.freedoms() as f64 * n.ln();
+        (c.gain - cost) * (1.0 + 0.01 * familiarity(name) - 0.003 * c.freedoms() as f64)
+    }
+}
+
+/// Effects that stand in every textbook model are likelier to be missing than others; wide families
+/// that imitate them are less likely.
+fn familiarity(name: &str) -> f64 {
+    match name {
+        "viscous_friction" | "coulomb_friction" | "rotor_inertia" => 3.0,
+        "torque_offset" => 2.0,
+        "payload" => 2.0,
+        "link_inertia" => -2.0,
+        "counterbalance" => -0.5,
+        _ => 0.0,
+    }
+}
+
+fn others(set: &[Candidate], i: usize) -> Vec<Candidate> {
+    set.iter()
+        .enumerate()
+        .filter(|(k, _)| *k != i)
+        .map(|(_, c)| c.clone())
+        .collect()
+}
+
+fn logistic(x: f64) -> f64 {
+    1.0 / (1.0 + (-x).exp())
+}
+
+/// Decides. `list` are all effects at all places with their best shapes alone.
+pub fn decide(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    list: &[Candidate],
+    progress: &dyn Fn(&str),
+) -> Decision {
+    let st = State {
+        evidence,
+        cx,
+        effects,
+    };
+    let data = evidence.data;
+    let rows = data.fitted as f64;
+    let (none, residual) = st.fit(&[]);
+    let before = st.gap(&residual, true);
+    let hold_before = st.gap(&residual, false);
+    let surprise = st.surprise(&none, &residual);
+    let free = data.parameters.len() as f64;
+    let total: f64 = before.iter().map(|v| v.max(0.0)).sum::<f64>();
+    let visible = before.iter().any(|v| *v > SOUND * rows);
+    let surprising = surprise > SURPRISE + 2.0 * free;
+    let mut set: Vec<Candidate> = Vec::new();
+    // forward steps
+    while set.len() < 4 {
+        progress(match set.len() {
+            0 => "first effect",
+            1 => "second effect",
+            2 => "third effect",
+            _ => "fourth effect",
+        });
+        let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
+        let mut next = st.challengers(list, &beside, 10);
+        next.retain(|c| !set.iter().any(|s| s.same(c)));
+        if std::env::var("EXCITE_DEBUG").is_ok() {
+            for c in &next {
+                eprintln!(
+                    "   step {} {} {:?} {:?} gain {:.0} merit {:.0}",
+                    set.len(),
+                    effects[c.effect].card().name,
+                    c.place,
+                    c.shape,
+                    c.gain,
+                    st.merit(c)
+                );
+            }
+        }
+        let Some(best) = next.first().cloned() else {
+            break;
+        };
+        let mut grown = set.clone();
+        grown.push(best);
+        // the best of all pairs may be another one
+        if grown.len() == 2
+            && let Some(pair) = best_pair(&st, list)
+        {
+            let gain = |s: &[Candidate]| st.fit(s).0.gain;
+            let mut pair = pair;
+            st.polish(&mut pair);
+            if gain(&pair) > gain(&grown) + 0.01 * total {
+                grown = pair;
+            }
+        }
+        if grown.len() > 1 {
+            st.polish(&mut grown);
+        }
+        if !accepted(&st, &set, &grown, total) {
+            break;
+        }
+        set = grown;
+    }
+    // a rival that does better beside the others takes the place
+    for _ in 0..2 {
+        let mut changed = false;
+        for i in 0..set.len() {
+            let rest = others(&set, i);
+            let beside: Vec<&Projected> = rest.iter().map(|c| &c.projected).collect();
+            let best = st.challengers(list, &beside, 6).into_iter().next();
+            if let Some(b) = best
+                && !b.same(&set[i])
+                && !rest.iter().any(|c| c.same(&b))
+                && st.merit(&b) > 1.01 * gained(&st, &set, i)
+            {
+                set[i] = b;
+                changed = true;
+            }
+        }
+        if !changed || set.len() < 2 {
+            break;
+        }
+    }
+    progress("rivals");
+    let (fit, residual) = st.fit(&set);
+    let after = st.gap(&residual, true);
+    let hold_after = st.gap(&residual, false);
+    let surprise_after = st.surprise(&fit, &residual);
+    let mut members: Vec<Member> = (0..set.len())
+        .map(|i| judge(&st, list, &set, i, &after, surprise_after, total))
+        .collect();
+    // coefficients of the common fit
+    let mut at = 0;
+    for m in &mut members {
+        let k = m.candidate.eta.len();
+        m.candidate.eta = fit.eta[at..at + k].to_vec();
+        let scale = inflation(&residual, data.fitted);
+        m.std = (at..at + k)
+            .map(|i| fit.covariance[i][i].max(0.0).sqrt() * scale)
+            .collect();
+        at += k;
+    }
+    members.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    let positive = |v: &[f64]| v.iter().map(|v| v.max(0.0)).sum::<f64>();
+    let left = positive(&after) + (surprise_after - free).max(0.0);
+    let unexplained = (left / (total + (surprise - free).max(0.0)).max(1e-9)).min(1.0);
+    let claims = members.iter().filter(|m| m.confidence >= 0.5).count();
+    let gap_left = after.iter().any(|v| *v > SOUND * rows);
+    let verdict = match (visible || surprising, claims) {
+        (false, 0) => Verdict::NoGap,
+        (_, 0) => Verdict::Unknown,
+        _ if gap_left && unexplained > 0.15 => Verdict::PartlyExplained,
+        _ => Verdict::Explained,
+    };
+    Decision {
+        verdict,
+        members,
+        fit,
+        before,
+        after,
+        holdout: [positive(&hold_before), positive(&hold_after)],
+        surprise: [surprise, surprise_after],
+        unexplained,
+    }
+}
+
+/// Gain of member `i` beside the others.
+fn gained(st: &State, set: &[Candidate], i: usize) -> f64 {
+    st.fit(set).0.gain - st.fit(&others(set, i)).0.gain
+}
+
+/// By how much coefficients are less certain than independent samples of unit noise would make them.
+fn inflation(residual: &[Vec<f64>], fitted: usize) -> f64 {
+    let mut power = 0.0;
+    let mut rho = 0.0;
+    for e in residual {
+        let e = &e[..fitted];
+        power += e.iter().map(|v| v * v).sum::<f64>();
+        for lag in 1..=20 {
+            let c: f64 = e[lag..].iter().zip(e).map(|(a, b)| a * b).sum();
+            rho += 2.0 * c.max(0.0);
+        }
+    }
+    let n = (residual.len() * fitted) as f64;
+    (power / n).max(1.0).sqrt() * (1.0 + rho / power.max(1e-300)).max(1.0).sqrt()
+}
+
+/// Whether a grown set explains enough more than the one before, also on holdout records.
+fn accepted(st: &State, set: &[Candidate], grown: &[Candidate], total: f64) -> bool {
+    let data = st.evidence.data;
+    let rows = data.fitted as f64;
+    let (f0, r0) = st.fit(set);
+    let (f1, r1) = st.fit(grown);
+    let chi = |r: &[Vec<f64>], fit: bool| -> f64 {
+        r.iter()
+            .map(|e| {
+                let part = if fit {
+                    &e[..data.fitted]
+                } else {
+                    &e[data.fitted..]
+                };
+                part.iter().map(|v| v * v).sum::<f64>()
+            })
+            .sum()
+    };
+    let visible = chi(&r0, true) - chi(&r1, true);
+    let prior = (f1.gain - f0.gain) - visible;
+    let held = data.rows() - data.fitted;
+    let hold = chi(&r0, false) - chi(&r1, false);
+    let significant = visible > LEAST * rows && visible > 0.02 * total;
+    let generalises = held == 0 || hold > 0.25 * visible * held as f64 / rows;
+    if significant && generalises {
+        return true;
+    }
+    prior > SURPRISE && prior > 0.5 * visible.abs() && (held == 0 || hold > -0.02 * held as f64)
+}
+
+/// The two candidates that explain most together.
+fn best_pair(st: &State, list: &[Candidate]) -> Option<Vec<Candidate>> {
+    let mut few: Vec<&Candidate> = Vec::new();
+    for c in list {
+        let same = few.iter().filter(|f| f.effect == c.effect).count();
+        if same < 3 && few.len() < 22 {
+            few.push(c);
+        }
+    }
+    let pairs: Vec<(usize, usize)> = (0..few.len())
+        .flat_map(|a| (a + 1..few.len()).map(move |b| (a, b)))
+        .collect();
+    let gains: Vec<f64> = pairs
+        .par_iter()
+        .map(|(a, b)| {
+            st.evidence
+                .fit(&[&few[*a].projected, &few[*b].projected])
+                .gain
+        })
+        .collect();
+    let best = (0..pairs.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b]))?;
+    let (a, b) = pairs[best];
+    Some(vec![few[a].clone(), few[b].clone()])
+}
+
+/// Confidence of member `i` of a set.
+fn judge(
+    st: &State,
+    list: &[Candidate],
+    set: &[Candidate],
+    i: usize,
+    after: &[f64],
+    surprise_after: f64,
+    total: f64,
+) -> Member {
+    let data = st.evidence.data;
+    let rows = data.fitted as f64;
+    let free = data.parameters.len() as f64;
+    let c = &set[i];
+    let rest = others(set, i);
+    let (f0, r0) = st.fit(&rest);
+    let (f1, r1) = st.fit(set);
+    let gain = f1.gain - f0.gain;
+    let without = st.gap(&r0, true);
+    let surprise_without = st.surprise(&f0, &r0);
+    let joints = st.joints_of(c);
+    let sum = |v: &[f64]| joints.iter().map(|j| v[*j].max(0.0)).sum::<f64>();
+    let (w, a) = (sum(&without), sum(after));
+    // of what is there without it on its joints; the least that counts is taken off
+    let slack = SLACK * rows * joints.len() as f64;
+    let visible = ((w - a) / (w - slack).max(w * 0.3).max(1e-9)).min(1.0);
+    let prior = (surprise_without - surprise_after) / (surprise_without - free).max(1.0);
+    let chi_gain = gain - (surprise_without - surprise_after);
+    let frozen = chi_gain < 0.5 * gain && surprise_without - surprise_after > SURPRISE;
+    let share = if frozen { prior } else { visible };
+    let held = data.rows() - data.fitted;
+    let (hw, ha) = (sum(&st.gap(&r0, false)), sum(&st.gap(&r1, false)));
+    let hold_slack = SLACK * held as f64 * joints.len() as f64;
+    let hold = if held == 0 || frozen {
+        share
+    } else {
+        ((hw - ha) / (hw - hold_slack).max(hw * 0.3).max(1e-9)).min(1.0)
+    };
+    // what it leaves on its joints, as the tests count it
+    let white: f64 = {
+        let all = gap::energies(data, &r1, |r| r.fit);
+        joints
+            .iter()
+            .map(|j| all[*j][0] + all[*j][1] + data.noise[*j].excess * rows)
+            .map(|v| v.max(0.0))
+            .sum()
+    };
+    // rivals in its place
+    let beside: Vec<&Projected> = rest.iter().map(|c| &c.projected).collect();
+    let own = st.merit(&Candidate { gain, ..c.clone() });
+    let mut rivals: Vec<Rival> = Vec::new();
+    for r in st.challengers(list, &beside, 14) {
+        if r.same(c) {
+            continue;
+        }
+        // what each would leave: the member what it leaves, the rival that and what it gains less
+        let less = own - st.merit(&r);
+        let left = if frozen {
+            (surprise_after - free).max(0.0) + 12.0
+        } else {
+            white + 30.0
+        };
+        let loss = less / own.max(1e-9);
+        let weight = (left / (left + less.max(-0.5 * left))).powf(2.5).min(1.5);
+        if weight > 0.02 {
+            rivals.push(Rival {
+                effect: r.effect,
+                place: r.place.clone(),
+                loss,
+                weight,
+                shape: r.shape.clone(),
+                eta: r.eta.clone(),
+            });
+        }
+    }
+    rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    // other effects share the confidence; the same effect elsewhere makes the place uncertain
+    let mut seen = vec![c.effect];
+    let mut against = 0.0;
+    for r in &rivals {
+        if !seen.contains(&r.effect) && !exchangeable(st, c.effect, r.effect) {
+            seen.push(r.effect);
+            against += r.weight;
+        }
+    }
+    let size = if frozen {
+        logistic((surprise_without - surprise_after - SURPRISE) / 12.0)
+    } else {
+        logistic((chi_gain / rows - LEAST) / 0.02)
+    };
+    let confidence =
+        size * logistic((share - 0.55) / 0.07) * logistic((hold - 0.3) / 0.07) / (1.0 + against);
+    let quad = |m: &faer::Mat<f64>| -> f64 {
+        let e = &c.eta;
+        (0..e.len())
+            .map(|x| (0..e.len()).map(|y| e[x] * m[(x, y)] * e[y]).sum::<f64>())
+            .sum()
+    };
+    let all_without: f64 = without.iter().map(|v| v.max(0.0)).sum();
+    let all_after: f64 = after.iter().map(|v| v.max(0.0)).sum();
+    let explains = if frozen {
+        prior
+    } else {
+        (all_without - all_after) / total.max(1e-9)
+    };
+    let hold_total: f64 = st
+        .gap(&st.fit(&[]).1, false)
+        .iter()
+        .map(|v| v.max(0.0))
+        .sum();
+    let hold_all = |r: &[Vec<f64>]| -> f64 { st.gap(r, false).iter().map(|v| v.max(0.0)).sum() };
+    let holdout = if held == 0 {
+        explains
+    } else {
+        (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
+    };
+    let spread = 2.0 * gain.max(0.0).sqrt() / total.max(1.0);
+    Member {
+        candidate: c.clone(),
+        confidence,
+        explains: explains.clamp(0.0, 1.0),
+        interval: [
+            (explains - spread).clamp(0.0, 1.0),
+            (explains + spread).clamp(0.0, 1.0),
+        ],
+        holdout: holdout.clamp(-1.0, 1.0),
+        visibility: (quad(&c.projected.s) / quad(&c.projected.raw).max(1e-300)).clamp(0.0, 1.0),
+        rivals,
+        std: Vec::new(),
+        frozen,
+    }
+}
+
+/// Effects that are the same thing by nature: an alias does not take confidence.
+fn exchangeable(st: &State, a: usize, b: usize) -> bool {
+    let (a, b) = (st.effects[a].card(), st.effects[b].card());
+    a.aliases.contains(&b.name) || b.aliases.contains(&a.name)
+}
