@@ -1,6 +1,6 @@
 //! All records side by side, and the columns that live on them.
 
-use super::noise::{Noise, between_periods, spectrum, LINES};
+use super::noise::{LINES, Noise, between_periods, spectrum};
 use super::record::Record;
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -125,7 +125,10 @@ impl<'a> Data<'a> {
             for j in 0..n {
                 let at = j * r.count;
                 tau[j][start[k]..start[k + 1]].copy_from_slice(r.torque(j));
-                averaged(&rest[at..at + r.count], &mut known[j][start[k]..start[k + 1]]);
+                averaged(
+                    &rest[at..at + r.count],
+                    &mut known[j][start[k]..start[k + 1]],
+                );
                 for c in 0..p {
                     let from = y.col(c);
                     let from: Vec<f64> = (at..at + r.count).map(|i| from[i]).collect();
@@ -354,7 +357,11 @@ impl<'a> Data<'a> {
     fn prior(&self) -> Vec<f64> {
         let robot = self.plant.robot();
         let identified = self.plant.prior() == Prior::Identified;
-        let heaviest = robot.bodies.iter().map(|b| b.inertia.mass()).fold(0.0, f64::max);
+        let heaviest = robot
+            .bodies
+            .iter()
+            .map(|b| b.inertia.mass())
+            .fold(0.0, f64::max);
         let actuated = self.plant.actuated();
         let size = |b: usize| -> f64 {
             // length of a link: where the next one starts, its centre of mass, its radius of gyration
@@ -373,7 +380,11 @@ impl<'a> Data<'a> {
             .iter()
             .map(|p| match p.kind {
                 Kind::Inertial { body, k } => {
-                    let m = robot.bodies[body].inertia.mass().max(0.02 * heaviest).max(1e-3);
+                    let m = robot.bodies[body]
+                        .inertia
+                        .mass()
+                        .max(0.02 * heaviest)
+                        .max(1e-3);
                     let l = size(body);
                     let [mass, first, second] = match identified {
                         true => [0.015, 0.006, 0.008],

@@ -384,7 +384,11 @@ pub fn of_logs(
                 holdout: main.holdout * (1.0 - r.loss).clamp(0.0, 1.0),
                 visibility: of.visibility,
                 values: effect.values(&cx, &r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
-                same: if r.weight > 0.25 { vec![main.effect] } else { Vec::new() },
+                same: if r.weight > 0.25 {
+                    vec![main.effect]
+                } else {
+                    Vec::new()
+                },
                 member: false,
                 frozen: main.frozen,
             });
@@ -446,7 +450,11 @@ fn record_gaps(
     refit: &[Vec<f64>],
     after: &[Vec<f64>],
 ) -> Vec<RecordGap> {
-    let all = [scaled(data, frozen), scaled(data, refit), scaled(data, after)];
+    let all = [
+        scaled(data, frozen),
+        scaled(data, refit),
+        scaled(data, after),
+    ];
     data.records
         .iter()
         .enumerate()
@@ -526,10 +534,13 @@ fn traces(data: &Data, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Trace> {
                 let step = r.cycle.unwrap_or(r.count.div_ceil(4));
                 for (i, piece) in before[j][data.span(k)].chunks(step).enumerate() {
                     let later = &after[j][data.span(k)][i * step..][..piece.len()];
-                    let rms = |x: &[f64]| {
-                        (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt()
-                    };
-                    drift.push([clock + i as f64 * step as f64 * r.dt, rms(piece), rms(later)]);
+                    let rms =
+                        |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt();
+                    drift.push([
+                        clock + i as f64 * step as f64 * r.dt,
+                        rms(piece),
+                        rms(later),
+                    ]);
                 }
                 clock += r.count as f64 * r.dt;
             }

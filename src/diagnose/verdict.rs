@@ -163,7 +163,12 @@ impl State<'_> {
     }
 
     /// Rivals of a place in the set with their best shapes, by falling gain beside the others.
-    fn challengers(&self, list: &[Candidate], beside: &[&Projected], most: usize) -> Vec<Candidate> {
+    fn challengers(
+        &self,
+        list: &[Candidate],
+        beside: &[&Projected],
+        most: usize,
+    ) -> Vec<Candidate> {
         let before = self.evidence.fit(beside);
         let mut quick: Vec<(f64, usize)> = list
             .par_iter()
@@ -178,7 +183,9 @@ impl State<'_> {
         // the best places of every effect
         let mut chosen: Vec<usize> = Vec::new();
         for (_, i) in &quick {
-            let same = chosen.iter().filter(|c| list[**c].effect == list[*i].effect);
+            let same = chosen
+                .iter()
+                .filter(|c| list[**c].effect == list[*i].effect);
             if same.count() < 2 && chosen.len() < most {
                 chosen.push(*i);
             }
@@ -275,7 +282,15 @@ pub fn decide(
         next.retain(|c| !set.iter().any(|s| s.same(c)));
         if std::env::var("EXCITE_DEBUG").is_ok() {
             for c in &next {
-                eprintln!("   step {} {} {:?} {:?} gain {:.0} merit {:.0}", set.len(), effects[c.effect].card().name, c.place, c.shape, c.gain, st.merit(c));
+                eprintln!(
+                    "   step {} {} {:?} {:?} gain {:.0} merit {:.0}",
+                    set.len(),
+                    effects[c.effect].card().name,
+                    c.place,
+                    c.shape,
+                    c.gain,
+                    st.merit(c)
+                );
             }
         }
         let Some(best) = next.first().cloned() else {
@@ -395,7 +410,11 @@ fn accepted(st: &State, set: &[Candidate], grown: &[Candidate], total: f64) -> b
     let chi = |r: &[Vec<f64>], fit: bool| -> f64 {
         r.iter()
             .map(|e| {
-                let part = if fit { &e[..data.fitted] } else { &e[data.fitted..] };
+                let part = if fit {
+                    &e[..data.fitted]
+                } else {
+                    &e[data.fitted..]
+                };
                 part.iter().map(|v| v * v).sum::<f64>()
             })
             .sum()
@@ -426,7 +445,11 @@ fn best_pair(st: &State, list: &[Candidate]) -> Option<Vec<Candidate>> {
         .collect();
     let gains: Vec<f64> = pairs
         .par_iter()
-        .map(|(a, b)| st.evidence.fit(&[&few[*a].projected, &few[*b].projected]).gain)
+        .map(|(a, b)| {
+            st.evidence
+                .fit(&[&few[*a].projected, &few[*b].projected])
+                .gain
+        })
         .collect();
     let best = (0..pairs.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b]))?;
     let (a, b) = pairs[best];
@@ -523,10 +546,8 @@ fn judge(
     } else {
         logistic((chi_gain / rows - LEAST) / 0.02)
     };
-    let confidence = size
-        * logistic((share - 0.55) / 0.07)
-        * logistic((hold - 0.3) / 0.07)
-        / (1.0 + against);
+    let confidence =
+        size * logistic((share - 0.55) / 0.07) * logistic((hold - 0.3) / 0.07) / (1.0 + against);
     let quad = |m: &faer::Mat<f64>| -> f64 {
         let e = &c.eta;
         (0..e.len())
