@@ -1,6 +1,6 @@
 //! Robot files of parallel robots: `robot.toml` with `mechanism = "…"`, or a bundled name.
 //!
-//! What a file may say is described in `docs/formats.md`. All kinds share the [head](common): name,
+//! What a file may say is described in `docs/formats.md`. All kinds share the head: name,
 //! gravity, home, workspace, actuators, joints; what describes the bodies is read by one file a
 //! kind.
 

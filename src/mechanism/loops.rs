@@ -9,7 +9,7 @@
 //! ```
 //!
 //! (Khalil & Dombre 2002, ch. 7; rows may be redundant, as those of a planar loop closed in space
-//! are.) Positions are found by [Newton's method](newton) from the sample before; derivatives of
+//! are.) Positions are found by Newton's method from the sample before; derivatives of
 //! all orders follow from the closures by the theorem of implicit functions, exactly, with `Φ`
 //! evaluated in numbers that carry their derivatives ([`scalar`](super::scalar)).
 //!
