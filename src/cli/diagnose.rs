@@ -1,12 +1,12 @@
 //! `excite diagnose EXPERIMENT`.
 
 use super::{pretty, print, warn, write};
+use excite::Result;
 use excite::diagnose::{Settings, diagnose, improve, json, page};
 use excite::estimate::robot::urdf;
 use excite::log::Experiment;
 use excite::output::prepare_dir;
 use excite::report::format::{percent, significant};
-use excite::Result;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -77,7 +77,11 @@ pub fn run(args: Args) -> Result<()> {
     let robot = improve::robot(&experiment.plant, &d);
     write(&paths[2], args.force, &urdf(&robot))?;
     if serial {
-        write(&paths[3], args.force, &improve::toml(&robot, &d, "robot.urdf"))?;
+        write(
+            &paths[3],
+            args.force,
+            &improve::toml(&robot, &d, "robot.urdf"),
+        )?;
         write(&paths[4], args.force, &improve::mujoco(&robot, &d))?;
         if let Some(n) = &d.next {
             n.trajectory.write(&paths[5], args.force)?;
@@ -110,7 +114,13 @@ pub fn run(args: Args) -> Result<()> {
                     significant(1.96 * s, 2),
                     v.unit
                 ),
-                None => writeln!(out, "  {:<26} {} {}", v.name, significant(v.value, 4), v.unit),
+                None => writeln!(
+                    out,
+                    "  {:<26} {} {}",
+                    v.name,
+                    significant(v.value, 4),
+                    v.unit
+                ),
             };
         }
         if !f.same.is_empty() {
@@ -121,12 +131,19 @@ pub fn run(args: Args) -> Result<()> {
         let _ = writeln!(
             out,
             "\nnext: {} separates {} (overlap {} now, {} predicted)",
-            paths.last().map_or(String::new(), |p| p.display().to_string()),
+            paths
+                .last()
+                .map_or(String::new(), |p| p.display().to_string()),
             n.separates.join(" from "),
             percent(n.overlap[0]),
             percent(n.overlap[1])
         );
     }
-    let _ = writeln!(out, "\n{} in {:.1} s", paths[1].display(), begin.elapsed().as_secs_f64());
+    let _ = writeln!(
+        out,
+        "\n{} in {:.1} s",
+        paths[1].display(),
+        begin.elapsed().as_secs_f64()
+    );
     print(&out)
 }

@@ -171,7 +171,10 @@ pub fn run(args: Args) -> Result<()> {
         }
     }
     // before the work, so that nothing is lost to a folder that is not there
-    for file in [Some(&args.output), args.experiment.as_ref()].into_iter().flatten() {
+    for file in [Some(&args.output), args.experiment.as_ref()]
+        .into_iter()
+        .flatten()
+    {
         if let Some(folder) = file.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
         }

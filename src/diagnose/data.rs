@@ -1,6 +1,6 @@
 //! All records side by side, and the columns that live on them.
 
-use super::noise::{Noise, between_periods, spectrum, LINES};
+use super::noise::{LINES, Noise, between_periods, spectrum};
 use super::record::Record;
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -125,7 +125,10 @@ impl<'a> Data<'a> {
             for j in 0..n {
                 let at = j * r.count;
                 tau[j][start[k]..start[k + 1]].copy_from_slice(r.torque(j));
-                averaged(&rest[at..at + r.count], &mut known[j][start[k]..start[k + 1]]);
+                averaged(
+                    &rest[at..at + r.count],
+                    &mut known[j][start[k]..start[k + 1]],
+                );
                 for c in 0..p {
                     let from = y.col(c);
                     let from: Vec<f64> = (at..at + r.count).map(|i| from[i]).collect();
@@ -282,9 +285,12 @@ impl<'a> Data<'a> {
     }
 
     fn first_noise(&self, j: usize) -> Noise {
+        // holdout records may hold what the fitted ones do not: only where those do not repeat
+        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
         let parts: Vec<(Vec<f64>, f64)> = self
             .records
             .iter()
+            .filter(|r| r.fit || !repeats)
             .filter_map(|r| Some((between_periods(r, r.torque(j))?, r.dt)))
             .collect();
         if !parts.is_empty() {
@@ -303,7 +309,9 @@ impl<'a> Data<'a> {
     /// Spectrum of the torque that unresolved acceleration makes.
     fn position_excess(&self, j: usize) -> Vec<f64> {
         let mut out = vec![0.0; LINES + 1];
-        let records: Vec<&Record> = self.records.iter().filter(|r| r.cycle.is_some()).collect();
+        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
+        let counts = |r: &&Record| r.cycle.is_some() && (r.fit || !repeats);
+        let records: Vec<&Record> = self.records.iter().filter(counts).collect();
         for r in &records {
             let variance = (self.inertia[j] * r.position_noise[j]).powi(2) / records.len() as f64;
             for (l, out) in out.iter_mut().enumerate() {
@@ -354,7 +362,11 @@ impl<'a> Data<'a> {
     fn prior(&self) -> Vec<f64> {
         let robot = self.plant.robot();
         let identified = self.plant.prior() == Prior::Identified;
-        let heaviest = robot.bodies.iter().map(|b| b.inertia.mass()).fold(0.0, f64::max);
+        let heaviest = robot
+            .bodies
+            .iter()
+            .map(|b| b.inertia.mass())
+            .fold(0.0, f64::max);
         let actuated = self.plant.actuated();
         let size = |b: usize| -> f64 {
             // length of a link: where the next one starts, its centre of mass, its radius of gyration
@@ -373,7 +385,11 @@ impl<'a> Data<'a> {
             .iter()
             .map(|p| match p.kind {
                 Kind::Inertial { body, k } => {
-                    let m = robot.bodies[body].inertia.mass().max(0.02 * heaviest).max(1e-3);
+                    let m = robot.bodies[body]
+                        .inertia
+                        .mass()
+                        .max(0.02 * heaviest)
+                        .max(1e-3);
                     let l = size(body);
                     let [mass, first, second] = match identified {
                         true => [0.015, 0.006, 0.008],

@@ -56,7 +56,11 @@ impl Energy {
     /// Sum over records of one kind and all actuators.
     pub fn sum(&self, records: impl Fn(usize) -> bool + Copy) -> f64 {
         let row = |r: &Vec<f64>| -> f64 {
-            r.iter().enumerate().filter(|(k, _)| records(*k)).map(|(_, v)| v).sum()
+            r.iter()
+                .enumerate()
+                .filter(|(k, _)| records(*k))
+                .map(|(_, v)| v)
+                .sum()
         };
         self.joints.iter().map(row).sum()
     }
@@ -86,7 +90,12 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     // four sums: the compiler may use wide registers without reordering one sum
     let mut s = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
+    let tail: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in a8.zip(b8) {
         for k in 0..8 {
             s[k] += x[k] * y[k];
@@ -104,7 +113,11 @@ impl<'a> Evidence<'a> {
         let phi: Vec<f64> = data.parameters.iter().map(|p| p.value).collect();
         // a parameter that is exactly zero a priori must still be able to move
         let floor = 1e-9;
-        let spread: Vec<f64> = data.spread.iter().map(|s| (s * loosen).max(floor)).collect();
+        let spread: Vec<f64> = data
+            .spread
+            .iter()
+            .map(|s| (s * loosen).max(floor))
+            .collect();
         let mut w: Vec<Mat<f64>> = (0..n)
             .into_par_iter()
             .map(|j| {
@@ -277,7 +290,11 @@ impl<'a> Evidence<'a> {
         for (i, a) in set.iter().enumerate() {
             let mut to = 0;
             for (m, other) in set.iter().enumerate().take(i + 1) {
-                let block = if m == i { a.s.clone() } else { self.cross(a, other) };
+                let block = if m == i {
+                    a.s.clone()
+                } else {
+                    self.cross(a, other)
+                };
                 for x in 0..sizes[i] {
                     for y in 0..sizes[m] {
                         s[(at + x, to + y)] = block[(x, y)];
@@ -307,7 +324,9 @@ impl<'a> Evidence<'a> {
             x.as_mut(),
             faer::Par::Seq,
         );
-        (0..p).map(|i| self.phi[i] + self.spread[i] * x[(i, 0)]).collect()
+        (0..p)
+            .map(|i| self.phi[i] + self.spread[i] * x[(i, 0)])
+            .collect()
     }
 
     fn reduced(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
@@ -331,7 +350,11 @@ impl<'a> Evidence<'a> {
             .into_par_iter()
             .map(|j| {
                 let y = &self.q[j] * faer::ColRef::from_slice(&u);
-                let mut e: Vec<f64> = self.r[j].iter().enumerate().map(|(i, r)| r - y[i]).collect();
+                let mut e: Vec<f64> = self.r[j]
+                    .iter()
+                    .enumerate()
+                    .map(|(i, r)| r - y[i])
+                    .collect();
                 let mut at = 0;
                 for a in set {
                     for column in &a.z {
@@ -423,7 +446,11 @@ pub fn solve(s: &Mat<f64>, b: &[f64]) -> Fit {
     Fit {
         gain: eta.iter().zip(b).map(|(e, b)| e * b).sum(),
         covariance: (0..k)
-            .map(|i| (0..k).map(|m| inverse[(i, m)] * scale[i] * scale[m]).collect())
+            .map(|i| {
+                (0..k)
+                    .map(|m| inverse[(i, m)] * scale[i] * scale[m])
+                    .collect()
+            })
             .collect(),
         eta,
     }

@@ -21,7 +21,7 @@ pub struct JointGap {
     pub noise: f64,
     /// share of the gap of the whole robot, weighted by noise
     pub share: f64,
-    /// residual over measured torque, rms
+    /// residual over measured torque, rms, both low-passed at about 20 Hz
     pub relative: f64,
 }
 
@@ -57,7 +57,8 @@ pub fn excess(record: &Record, e: &[f64]) -> (f64, f64) {
     let slow = match between_periods(record, e) {
         Some(x) => {
             let s = spectrum(&x);
-            let low = ((super::noise::SLOW * 2.0 * record.dt * LINES as f64) as usize).clamp(1, LINES / 4);
+            let low = ((super::noise::SLOW * 2.0 * record.dt * LINES as f64) as usize)
+                .clamp(1, LINES / 4);
             let mut rest = s[low..].to_vec();
             rest.sort_by(f64::total_cmp);
             let level = rest[rest.len() / 2].max(1.0);
@@ -72,7 +73,11 @@ pub fn excess(record: &Record, e: &[f64]) -> (f64, f64) {
 
 /// Gap energy by actuator over the records that `pick` takes, in units of the noise variance; what
 /// encoders cannot resolve is taken off.
-pub fn energies(data: &Data, residual: &[Vec<f64>], pick: impl Fn(&Record) -> bool) -> Vec<[f64; 2]> {
+pub fn energies(
+    data: &Data,
+    residual: &[Vec<f64>],
+    pick: impl Fn(&Record) -> bool,
+) -> Vec<[f64; 2]> {
     (0..data.joints())
         .map(|j| {
             let mut sum = [0.0; 2];
@@ -89,23 +94,36 @@ pub fn energies(data: &Data, residual: &[Vec<f64>], pick: impl Fn(&Record) -> bo
 }
 
 /// Gap of each actuator from a residual in N m.
-pub fn joints(data: &Data, residual: &[Vec<f64>], pick: impl Fn(&Record) -> bool + Copy) -> Vec<JointGap> {
+pub fn joints(
+    data: &Data,
+    residual: &[Vec<f64>],
+    pick: impl Fn(&Record) -> bool + Copy,
+) -> Vec<JointGap> {
     let names = data.plant.actuators();
     let mut out: Vec<JointGap> = (0..data.joints())
         .map(|j| {
-            let (mut sum, mut count, mut torque) = (0.0, 0.0, 0.0);
+            let (mut sum, mut count, mut torque, mut filtered) = (0.0, 0.0, 0.0, 0.0);
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| pick(r)) {
-                sum += residual[j][data.span(k)].iter().map(|v| v * v).sum::<f64>();
-                torque += r.torque(j).iter().map(|v| v * v).sum::<f64>();
+                let e = &residual[j][data.span(k)];
+                sum += e.iter().map(|v| v * v).sum::<f64>();
                 count += r.count as f64;
+                // relative errors below about 20 Hz, torque and residual filtered alike
+                let w = ((0.024 / r.dt).round() as usize).max(1);
+                let low = |x: &[f64]| -> f64 {
+                    super::record::triangle(x, w).iter().map(|v| v * v).sum()
+                };
+                filtered += low(e);
+                torque += low(r.torque(j));
             }
             let noise = data.noise[j].std;
             JointGap {
                 joint: names[j].name.clone(),
-                rms: (sum / count - noise * noise * (1.0 + data.noise[j].excess)).max(0.0).sqrt(),
+                rms: (sum / count - noise * noise * (1.0 + data.noise[j].excess))
+                    .max(0.0)
+                    .sqrt(),
                 noise,
                 share: 0.0,
-                relative: (sum / torque.max(1e-300)).sqrt(),
+                relative: (filtered / torque.max(1e-300)).sqrt(),
             }
         })
         .collect();
@@ -222,6 +240,5 @@ pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
             }
         }
     }
-    (gap > 0.02 * (data.fitted * data.joints()) as f64)
-        .then(|| (1.0 - left / gap).clamp(0.0, 1.0))
+    (gap > 0.02 * (data.fitted * data.joints()) as f64).then(|| (1.0 - left / gap).clamp(0.0, 1.0))
 }

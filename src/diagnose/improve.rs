@@ -11,7 +11,11 @@ use std::fmt::Write;
 pub fn robot(plant: &Plant, d: &Diagnosis) -> Robot {
     let mut robot = files::with_values(plant, &d.phi);
     let actuated = plant.actuated();
-    for f in d.findings.iter().filter(|f| f.member && f.confidence >= 0.5) {
+    for f in d
+        .findings
+        .iter()
+        .filter(|f| f.member && f.confidence >= 0.5)
+    {
         let term = match f.effect {
             "rotor_inertia" => 0,
             "viscous_friction" => 1,
@@ -28,8 +32,13 @@ pub fn robot(plant: &Plant, d: &Diagnosis) -> Robot {
                     if f.effect == "payload" && f.eta.len() == 4 && f.eta[0] > 0.0 {
                         let m = f.eta[0];
                         let c = nalgebra::Vector3::new(f.eta[1], f.eta[2], f.eta[3]) / m;
-                        let i = m * (nalgebra::Matrix3::identity() * c.norm_squared() - c * c.transpose());
-                        for (k, v) in [i.m11, i.m12, i.m13, i.m22, i.m23, i.m33].into_iter().enumerate() {
+                        let i = m
+                            * (nalgebra::Matrix3::identity() * c.norm_squared()
+                                - c * c.transpose());
+                        for (k, v) in [i.m11, i.m12, i.m13, i.m22, i.m23, i.m33]
+                            .into_iter()
+                            .enumerate()
+                        {
                             robot.bodies[b].inertia.0[4 + k] += v;
                         }
                     }
@@ -54,7 +63,11 @@ pub fn robot(plant: &Plant, d: &Diagnosis) -> Robot {
 /// say what a simulator must add.
 pub fn toml(robot: &Robot, d: &Diagnosis, urdf: &str) -> String {
     let mut out = robot.to_toml_template(urdf);
-    let claims: Vec<_> = d.findings.iter().filter(|f| f.member && f.confidence >= 0.5).collect();
+    let claims: Vec<_> = d
+        .findings
+        .iter()
+        .filter(|f| f.member && f.confidence >= 0.5)
+        .collect();
     if !claims.is_empty() {
         out.push_str("\n# Effects found by `excite diagnose`:\n");
     }
@@ -76,7 +89,11 @@ pub fn toml(robot: &Robot, d: &Diagnosis, urdf: &str) -> String {
 pub fn mujoco(robot: &Robot, d: &Diagnosis) -> String {
     let mut out = files::mujoco(robot);
     let mut notes = String::new();
-    for f in d.findings.iter().filter(|f| f.member && f.confidence >= 0.5) {
+    for f in d
+        .findings
+        .iter()
+        .filter(|f| f.member && f.confidence >= 0.5)
+    {
         let at = f.joints.join(" ");
         let value = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);
         let line = match f.effect {
@@ -104,9 +121,11 @@ pub fn mujoco(robot: &Robot, d: &Diagnosis) -> String {
         }
     }
     if !notes.is_empty() {
-        let comment = format!("<!-- found by excite diagnose\n{}-->\n", notes.replace("--", "- -"));
+        let comment = format!(
+            "<!-- found by excite diagnose\n{}-->\n",
+            notes.replace("--", "- -")
+        );
         out = format!("{comment}{out}");
     }
     out
 }
-

@@ -129,9 +129,9 @@ pub fn propose(
     let Some(main) = findings.iter().find(|f| f.member && f.confidence > 0.02) else {
         return Ok(None);
     };
-    let rival = findings.iter().find(|f| {
-        !f.member && f.effect != main.effect && f.confidence > 0.08 * main.confidence
-    });
+    let rival = findings
+        .iter()
+        .find(|f| !f.member && f.effect != main.effect && f.confidence > 0.08 * main.confidence);
     let Some(rival) = rival else {
         return Ok(None);
     };
@@ -152,9 +152,8 @@ pub fn propose(
         b: (b, rival),
     };
     let evidence = Evidence::new(data, 1.0);
-    let project = |e: &dyn Effect, f: &Finding| {
-        evidence.project(&e.columns(cx, &f.place, &f.shape, false))
-    };
+    let project =
+        |e: &dyn Effect, f: &Finding| evidence.project(&e.columns(cx, &f.place, &f.shape, false));
     let now = evidence.overlap(&project(a, main), &main.eta, &project(b, rival));
     drop(evidence);
 
@@ -202,7 +201,11 @@ pub fn propose(
         tries += 1;
         let mut t = trajectory.clone();
         for s in &mut t.fourier.joints {
-            let size = s.sin.iter().chain(&s.cos).fold(0.0f64, |m, v| m.max(v.abs()));
+            let size = s
+                .sin
+                .iter()
+                .chain(&s.cos)
+                .fold(0.0f64, |m, v| m.max(v.abs()));
             for v in s.sin.iter_mut().chain(&mut s.cos) {
                 *v += step * size * rng.random_range(-1.0..1.0);
             }

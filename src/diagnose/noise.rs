@@ -260,9 +260,8 @@ mod tests {
         let noise = Noise::new(spectrum(&x), Source::Periods);
         let mut w = Vec::new();
         noise.whiten(&x, &mut w);
-        let power = |lag: usize| {
-            w[lag..].iter().zip(&w).map(|(a, b)| a * b).sum::<f64>() / w.len() as f64
-        };
+        let power =
+            |lag: usize| w[lag..].iter().zip(&w).map(|(a, b)| a * b).sum::<f64>() / w.len() as f64;
         assert!((power(0) - 1.0).abs() < 0.05, "{}", power(0));
         assert!(power(1).abs() < 0.05 && power(2).abs() < 0.05);
         // variance of the process: 1/(1 − 0.64)

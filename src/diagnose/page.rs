@@ -28,7 +28,10 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         ),
         Verdict::PartlyExplained => (
             Tone::Fair,
-            format!("Partly explained: {}. Something remains: {left} of the gap.", names()),
+            format!(
+                "Partly explained: {}. Something remains: {left} of the gap.",
+                names()
+            ),
         ),
         Verdict::Unknown => (
             Tone::Bad,
@@ -39,7 +42,9 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                     f.title,
                     percent(f.confidence)
                 ),
-                None => "Unknown: there is a gap, and no effect of the catalogue explains it.".into(),
+                None => {
+                    "Unknown: there is a gap, and no effect of the catalogue explains it.".into()
+                }
             },
         ),
     }
@@ -216,7 +221,10 @@ fn residuals(d: &Diagnosis) -> Markup {
                 x: Axis::linear("time, s"),
                 y: Axis::linear(unit("residual", d.units[j])),
                 rules: vec![level(2.0 * noise, "2σ noise"), level(-2.0 * noise, "")],
-                series: vec![line(&t.before, Colour::BLUE), line(&t.after, Colour::ORANGE)],
+                series: vec![
+                    line(&t.before, Colour::BLUE),
+                    line(&t.after, Colour::ORANGE),
+                ],
                 ..Panel::default()
             }
         })
@@ -286,8 +294,16 @@ fn maps(d: &Diagnosis) -> Markup {
         {
             let of = if k == 2 { d.units[j] } else { "" };
             panels.push(Panel {
-                title: if k == 0 { d.joints[j].clone() } else { String::new() },
-                x: Axis::linear(if of.is_empty() { label.to_string() } else { unit(label, of) }),
+                title: if k == 0 {
+                    d.joints[j].clone()
+                } else {
+                    String::new()
+                },
+                x: Axis::linear(if of.is_empty() {
+                    label.to_string()
+                } else {
+                    unit(label, of)
+                }),
                 y: Axis::linear(unit("residual", d.units[j])),
                 series: vec![
                     dots(x, &t.before, Colour::BLUE),

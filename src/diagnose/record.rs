@@ -188,9 +188,11 @@ fn repeats(raw: &Raw, mean: f64, period: f64) -> bool {
         return false;
     }
     raw.q.iter().all(|q| {
-        let (lo, hi) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-            (a.min(*v), b.max(*v))
-        });
+        let (lo, hi) = q
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(*v), b.max(*v))
+            });
         let apart: f64 = (0..n - lag).map(|i| (q[i + lag] - q[i]).powi(2)).sum();
         (apart / (n - lag) as f64).sqrt() < 1e-3 * (hi - lo).max(1e-9)
     })
@@ -239,7 +241,7 @@ fn resample(t: &[f64], x: &[f64], mean: f64, dt: f64, count: usize, stamped: boo
 }
 
 /// Triangular moving average of half-width `w` samples.
-fn triangle(x: &[f64], w: usize) -> Vec<f64> {
+pub(crate) fn triangle(x: &[f64], w: usize) -> Vec<f64> {
     let n = x.len() as isize;
     let w = w as isize;
     (0..n)
@@ -287,13 +289,7 @@ fn third_difference(x: &[f64], n: usize, count: usize) -> f64 {
 }
 
 /// Fourier series of the mean period, with its derivatives, over the whole record.
-fn periodic(
-    q: &[f64],
-    n: usize,
-    count: usize,
-    cycle: usize,
-    dt: f64,
-) -> (Samples, Vec<f64>, f64) {
+fn periodic(q: &[f64], n: usize, count: usize, cycle: usize, dt: f64) -> (Samples, Vec<f64>, f64) {
     let periods = count / cycle;
     let period = cycle as f64 * dt;
     let omega = 2.0 * PI / period;
@@ -340,7 +336,10 @@ fn periodic(
                 one[2][i] -= w * w * (a * c + b * s);
             }
         }
-        for (to, from) in [&mut out.q, &mut out.qd, &mut out.qdd].into_iter().zip(&one) {
+        for (to, from) in [&mut out.q, &mut out.qd, &mut out.qdd]
+            .into_iter()
+            .zip(&one)
+        {
             for p in 0..periods {
                 to[j * count + p * cycle..][..cycle].copy_from_slice(from);
             }

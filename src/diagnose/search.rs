@@ -105,8 +105,13 @@ pub fn best_shape(
         let grid = effect.shapes(cx, place);
         let bounds: Vec<[f64; 2]> = (0..shape.len())
             .map(|k| {
-                let ends = grid.iter().map(|s| s[k]).filter(|v| v.signum() == shape[k].signum());
-                ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| [a.min(v.abs()), b.max(v.abs())])
+                let ends = grid
+                    .iter()
+                    .map(|s| s[k])
+                    .filter(|v| v.signum() == shape[k].signum());
+                ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+                    [a.min(v.abs()), b.max(v.abs())]
+                })
             })
             .collect();
         for step in [1.3f64, 1.12, 1.05] {
@@ -118,7 +123,8 @@ pub fn best_shape(
                     loop {
                         let mut next = shape.clone();
                         next[k] *= factor;
-                        if next[k].abs() < bounds[k][0] / 1.5 || next[k].abs() > bounds[k][1] * 1.2 {
+                        if next[k].abs() < bounds[k][0] / 1.5 || next[k].abs() > bounds[k][1] * 1.2
+                        {
                             break;
                         }
                         let tried =

@@ -163,7 +163,12 @@ impl State<'_> {
     }
 
     /// Rivals of a place in the set with their best shapes, by falling gain beside the others.
-    fn challengers(&self, list: &[Candidate], beside: &[&Projected], most: usize) -> Vec<Candidate> {
+    fn challengers(
+        &self,
+        list: &[Candidate],
+        beside: &[&Projected],
+        most: usize,
+    ) -> Vec<Candidate> {
         let before = self.evidence.fit(beside);
         let mut quick: Vec<(f64, usize)> = list
             .par_iter()
@@ -178,7 +183,9 @@ impl State<'_> {
         // the best places of every effect
         let mut chosen: Vec<usize> = Vec::new();
         for (_, i) in &quick {
-            let same = chosen.iter().filter(|c| list[**c].effect == list[*i].effect);
+            let same = chosen
+                .iter()
+                .filter(|c| list[**c].effect == list[*i].effect);
             if same.count() < 2 && chosen.len() < most {
                 chosen.push(*i);
             }
@@ -273,11 +280,6 @@ pub fn decide(
         let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
         let mut next = st.challengers(list, &beside, 10);
         next.retain(|c| !set.iter().any(|s| s.same(c)));
-        if std::env::var("EXCITE_DEBUG").is_ok() {
-            for c in &next {
-                eprintln!("   step {} {} {:?} {:?} gain {:.0} merit {:.0}", set.len(), effects[c.effect].card().name, c.place, c.shape, c.gain, st.merit(c));
-            }
-        }
         let Some(best) = next.first().cloned() else {
             break;
         };
@@ -343,8 +345,14 @@ pub fn decide(
     }
     members.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     let positive = |v: &[f64]| v.iter().map(|v| v.max(0.0)).sum::<f64>();
-    let left = positive(&after) + (surprise_after - free).max(0.0);
-    let unexplained = (left / (total + (surprise - free).max(0.0)).max(1e-9)).min(1.0);
+    // an effect that hides in the parameters is measured against the frozen model
+    let hides = members.iter().any(|m| m.frozen);
+    let whole = |fit: bool| positive(&st.gap(&evidence.r, fit));
+    let [base, base_held] = match hides {
+        true => [whole(true), whole(false)],
+        false => [total, positive(&hold_before)],
+    };
+    let unexplained = (positive(&after) / base.max(1e-9)).min(1.0);
     let claims = members.iter().filter(|m| m.confidence >= 0.5).count();
     let gap_left = after.iter().any(|v| *v > SOUND * rows);
     let verdict = match (visible || surprising, claims) {
@@ -359,7 +367,7 @@ pub fn decide(
         fit,
         before,
         after,
-        holdout: [positive(&hold_before), positive(&hold_after)],
+        holdout: [base_held, positive(&hold_after)],
         surprise: [surprise, surprise_after],
         unexplained,
     }
@@ -395,7 +403,11 @@ fn accepted(st: &State, set: &[Candidate], grown: &[Candidate], total: f64) -> b
     let chi = |r: &[Vec<f64>], fit: bool| -> f64 {
         r.iter()
             .map(|e| {
-                let part = if fit { &e[..data.fitted] } else { &e[data.fitted..] };
+                let part = if fit {
+                    &e[..data.fitted]
+                } else {
+                    &e[data.fitted..]
+                };
                 part.iter().map(|v| v * v).sum::<f64>()
             })
             .sum()
@@ -426,7 +438,11 @@ fn best_pair(st: &State, list: &[Candidate]) -> Option<Vec<Candidate>> {
         .collect();
     let gains: Vec<f64> = pairs
         .par_iter()
-        .map(|(a, b)| st.evidence.fit(&[&few[*a].projected, &few[*b].projected]).gain)
+        .map(|(a, b)| {
+            st.evidence
+                .fit(&[&few[*a].projected, &few[*b].projected])
+                .gain
+        })
         .collect();
     let best = (0..pairs.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b]))?;
     let (a, b) = pairs[best];
@@ -496,8 +512,11 @@ fn judge(
             white + 30.0
         };
         let loss = less / own.max(1e-9);
-        let weight = (left / (left + less.max(-0.5 * left))).powf(2.5).min(1.5);
-        if weight > 0.02 {
+        // and what each explains at all
+        let by_gain = (1.0 - loss).max(0.0).powi(6);
+        let by_left = (left / (left + less.max(-0.5 * left))).powf(2.5);
+        let weight = by_gain.min(by_left).min(1.5);
+        if loss < 0.98 {
             rivals.push(Rival {
                 effect: r.effect,
                 place: r.place.clone(),
@@ -523,9 +542,25 @@ fn judge(
     } else {
         logistic((chi_gain / rows - LEAST) / 0.02)
     };
+    // an effect that explains a part only is believed where nothing else comes near that part
+    let best = rivals
+        .iter()
+        .filter(|r| r.effect != c.effect && !exchangeable(st, c.effect, r.effect))
+        .fold(1.0f64, |m, r| m.min(r.loss));
+    let alone = logistic((best - 0.35) / 0.04) * logistic((share - 0.15) / 0.02);
+    // gain on holdout records per row against that on fitted ones: the same effect is at work there
+    let chi = |e: &[Vec<f64>]| -> f64 {
+        e.iter()
+            .map(|e| e[data.fitted..].iter().map(|v| v * v).sum::<f64>())
+            .sum()
+    };
+    let repeats = match held > 0 && !frozen {
+        true => (chi(&r0) - chi(&r1)) / held as f64 / (chi_gain / rows).max(1e-9),
+        false => 1.0,
+    };
     let confidence = size
-        * logistic((share - 0.55) / 0.07)
-        * logistic((hold - 0.3) / 0.07)
+        * logistic((share - 0.55) / 0.07).max(alone)
+        * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07))
         / (1.0 + against);
     let quad = |m: &faer::Mat<f64>| -> f64 {
         let e = &c.eta;
@@ -535,8 +570,11 @@ fn judge(
     };
     let all_without: f64 = without.iter().map(|v| v.max(0.0)).sum();
     let all_after: f64 = after.iter().map(|v| v.max(0.0)).sum();
+    // an effect that hides in the parameters: what the frozen model lacks
+    let whole =
+        |e: &[Vec<f64>], fit: bool| -> f64 { st.gap(e, fit).iter().map(|v| v.max(0.0)).sum() };
     let explains = if frozen {
-        prior
+        1.0 - all_after / whole(&st.evidence.r, true).max(1e-9)
     } else {
         (all_without - all_after) / total.max(1e-9)
     };
@@ -548,6 +586,8 @@ fn judge(
     let hold_all = |r: &[Vec<f64>]| -> f64 { st.gap(r, false).iter().map(|v| v.max(0.0)).sum() };
     let holdout = if held == 0 {
         explains
+    } else if frozen {
+        1.0 - whole(&r1, false) / whole(&st.evidence.r, false).max(1e-9)
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };

@@ -27,7 +27,10 @@ impl Effect for Backlash {
                 .fold((0.0f64, 0.0f64), |(a, b), v| (a.min(*v), b.max(*v)));
             lo < -0.01 * cx.peak[*j] && hi > 0.01 * cx.peak[*j]
         };
-        (0..cx.data.joints()).filter(crosses).map(|j| vec![j]).collect()
+        (0..cx.data.joints())
+            .filter(crosses)
+            .map(|j| vec![j])
+            .collect()
     }
 
     fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {

@@ -17,7 +17,11 @@ impl Effect for BaseCompliance {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { vec![Vec::new()] } else { Vec::new() }
+        if cx.serial() {
+            vec![Vec::new()]
+        } else {
+            Vec::new()
+        }
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
@@ -142,10 +146,13 @@ pub(crate) fn tilted(
                 let step = 1e-4 / largest;
                 let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
                 let side = |sign: f64| {
-                    let tilt: [Vec<f64>; 3] = std::array::from_fn(|d| {
-                        full[d].iter().map(|v| sign * step * v).collect()
-                    });
-                    let tilts = if axis == 0 { [&tilt, &still] } else { [&still, &tilt] };
+                    let tilt: [Vec<f64>; 3] =
+                        std::array::from_fn(|d| full[d].iter().map(|v| sign * step * v).collect());
+                    let tilts = if axis == 0 {
+                        [&tilt, &still]
+                    } else {
+                        [&still, &tilt]
+                    };
                     let x = extended(r, tilts);
                     let mut tau = vec![0.0; x.dof * x.count];
                     tree.inverse_dynamics(&mut Default::default(), &phi, &x, &mut tau);

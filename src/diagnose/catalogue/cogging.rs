@@ -48,8 +48,18 @@ impl Effect for Cogging {
             Motion::Prismatic => "rad/m",
         };
         vec![
-            value("amplitude", scale * amplitude, scale * std[0].max(std[1]), unit),
-            value("phase", eta[1].atan2(eta[0]), std[0].max(std[1]) / amplitude.max(1e-300), "rad"),
+            value(
+                "amplitude",
+                scale * amplitude,
+                scale * std[0].max(std[1]),
+                unit,
+            ),
+            value(
+                "phase",
+                eta[1].atan2(eta[0]),
+                std[0].max(std[1]) / amplitude.max(1e-300),
+                "rad",
+            ),
             constant("per_position", shape[0], per),
         ]
     }

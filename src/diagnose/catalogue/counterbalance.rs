@@ -49,7 +49,9 @@ impl Effect for Counterbalance {
     ) -> Vec<Value> {
         let unit = cx.torque_unit(place[0]);
         let names = ["sine", "cosine", "sine_twice", "cosine_twice"];
-        (0..4).map(|k| value(names[k], eta[k], std[k], unit)).collect()
+        (0..4)
+            .map(|k| value(names[k], eta[k], std[k], unit))
+            .collect()
     }
 }
 

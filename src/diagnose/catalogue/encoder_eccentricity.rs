@@ -21,7 +21,10 @@ impl Effect for EncoderEccentricity {
             return Vec::new();
         }
         let turns = |j: &usize| cx.motion(*j) == Motion::Revolute;
-        (0..cx.data.joints()).filter(turns).map(|j| vec![j]).collect()
+        (0..cx.data.joints())
+            .filter(turns)
+            .map(|j| vec![j])
+            .collect()
     }
 
     fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
@@ -31,7 +34,11 @@ impl Effect for EncoderEccentricity {
                 let (q, v) = r.state(j);
                 let a = r.acceleration(j);
                 let value = q.iter().map(|q| (q + phase).sin()).collect();
-                let first = q.iter().zip(v).map(|(q, v)| (q + phase).cos() * v).collect();
+                let first = q
+                    .iter()
+                    .zip(v)
+                    .map(|(q, v)| (q + phase).cos() * v)
+                    .collect();
                 let second = (0..r.count)
                     .map(|i| {
                         let (s, c) = (q[i] + phase).sin_cos();

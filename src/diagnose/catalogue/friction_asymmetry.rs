@@ -52,11 +52,25 @@ impl Effect for FrictionAsymmetry {
             Motion::Prismatic => "N s/m",
         };
         // F_v^+ − F_v^−: half of it goes with |q̇|
-        let mut all = vec![value("viscous_difference", 2.0 * eta[0], 2.0 * std[0], unit)];
+        let mut all = vec![value(
+            "viscous_difference",
+            2.0 * eta[0],
+            2.0 * std[0],
+            unit,
+        )];
         if shape[0] > 0.0 {
             let (e, s) = (eta[1], std[1]);
-            all.push(value("coulomb_difference", 2.0 * e, 2.0 * s, cx.torque_unit(place[0])));
-            all.push(constant("turnover_velocity", shape[0], cx.speed_unit(place[0])));
+            all.push(value(
+                "coulomb_difference",
+                2.0 * e,
+                2.0 * s,
+                cx.torque_unit(place[0]),
+            ));
+            all.push(constant(
+                "turnover_velocity",
+                shape[0],
+                cx.speed_unit(place[0]),
+            ));
         }
         all
     }

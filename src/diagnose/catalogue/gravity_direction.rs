@@ -17,7 +17,11 @@ impl Effect for GravityDirection {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { vec![Vec::new()] } else { Vec::new() }
+        if cx.serial() {
+            vec![Vec::new()]
+        } else {
+            Vec::new()
+        }
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {

@@ -35,7 +35,11 @@ impl Effect for JointCoupling {
         let (j, k, s) = (place[0], place[1], shape[0]);
         let width = 1e-3 * (cx.data.speed[j] + cx.data.speed[k]);
         let sum = |r: &Record, of: fn(&Record, usize) -> Vec<f64>| -> Vec<f64> {
-            of(r, j).iter().zip(of(r, k)).map(|(a, b)| a + s * b).collect()
+            of(r, j)
+                .iter()
+                .zip(of(r, k))
+                .map(|(a, b)| a + s * b)
+                .collect()
         };
         let position = |r: &Record, i: usize| r.state(i).0.to_vec();
         let velocity = |r: &Record, i: usize| r.state(i).1.to_vec();

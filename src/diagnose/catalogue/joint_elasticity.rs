@@ -17,7 +17,11 @@ impl Effect for JointElasticity {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { cx.singles() } else { Vec::new() }
+        if cx.serial() {
+            cx.singles()
+        } else {
+            Vec::new()
+        }
     }
 
     fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
@@ -75,7 +79,12 @@ impl Effect for JointElasticity {
         let mass = cx.mass[j][j].iter().sum::<f64>() / cx.data.rows() as f64;
         let k = mass * (2.0 * std::f64::consts::PI * shape[0]).powi(2);
         vec![
-            value("stiffness", k / eta[0], k * std[0] / (eta[0] * eta[0]), unit),
+            value(
+                "stiffness",
+                k / eta[0],
+                k * std[0] / (eta[0] * eta[0]),
+                unit,
+            ),
             constant("natural_frequency", shape[0], "Hz"),
             constant("damping_ratio", shape[1], ""),
             constant("cubic_share", shape[2], ""),

@@ -17,7 +17,11 @@ impl Effect for JointOffset {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { cx.singles() } else { Vec::new() }
+        if cx.serial() {
+            cx.singles()
+        } else {
+            Vec::new()
+        }
     }
 
     fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {

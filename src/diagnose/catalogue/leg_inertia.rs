@@ -17,7 +17,11 @@ impl Effect for LegInertia {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { Vec::new() } else { vec![Vec::new()] }
+        if cx.serial() {
+            Vec::new()
+        } else {
+            vec![Vec::new()]
+        }
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
@@ -32,7 +36,9 @@ impl Effect for LegInertia {
         eta: &[f64],
         std: &[f64],
     ) -> Vec<Value> {
-        let names = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+        let names = [
+            "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
+        ];
         (0..eta.len().min(10))
             .map(|k| value(names[k], eta[k], std[k], crate::robot::inertia::UNITS[k]))
             .collect()

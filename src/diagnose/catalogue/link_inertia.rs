@@ -20,7 +20,13 @@ impl Effect for LinkInertia {
         if !cx.serial() {
             return Vec::new();
         }
-        cx.data.plant.robot().bodies.iter().map(|b| vec![b.coordinate]).collect()
+        cx.data
+            .plant
+            .robot()
+            .bodies
+            .iter()
+            .map(|b| vec![b.coordinate])
+            .collect()
     }
 
     fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
@@ -37,7 +43,9 @@ impl Effect for LinkInertia {
         eta: &[f64],
         std: &[f64],
     ) -> Vec<Value> {
-        let names = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+        let names = [
+            "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
+        ];
         (0..10)
             .map(|k| value(names[k], eta[k], std[k], crate::robot::inertia::UNITS[k]))
             .collect()

@@ -8,8 +8,8 @@ mod backlash;
 mod base_compliance;
 mod cable_spring;
 mod cogging;
-mod counterbalance;
 mod coulomb_friction;
+mod counterbalance;
 mod encoder_eccentricity;
 mod friction_asymmetry;
 mod gravity_direction;
@@ -305,7 +305,11 @@ impl<'a> Context<'a> {
         let wrap = r.cycle.is_some();
         let at = |x: &[f64], i: isize| {
             let m = n as isize;
-            x[if wrap { i.rem_euclid(m) } else { i.clamp(0, m - 1) } as usize]
+            x[if wrap {
+                i.rem_euclid(m)
+            } else {
+                i.clamp(0, m - 1)
+            } as usize]
         };
         let low = |x: &[f64]| -> Vec<f64> {
             (0..n as isize)
@@ -324,9 +328,7 @@ impl<'a> Context<'a> {
             .map(|i| (at(&value, i + 1) - at(&value, i - 1)) / (2.0 * r.dt))
             .collect();
         let second = (0..n as isize)
-            .map(|i| {
-                (at(&value, i + 1) - 2.0 * at(&value, i) + at(&value, i - 1)) / (r.dt * r.dt)
-            })
+            .map(|i| (at(&value, i + 1) - 2.0 * at(&value, i) + at(&value, i - 1)) / (r.dt * r.dt))
             .collect();
         [value, first, second]
     }

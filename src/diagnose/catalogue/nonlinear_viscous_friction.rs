@@ -21,7 +21,9 @@ impl Effect for NonlinearViscousFriction {
     }
 
     fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        [0.35, 0.5, 0.7, 1.35, 1.7, 2.0, 2.5, 3.0].map(|a| vec![a]).to_vec()
+        [0.35, 0.5, 0.7, 1.35, 1.7, 2.0, 2.5, 3.0]
+            .map(|a| vec![a])
+            .to_vec()
     }
 
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
@@ -40,8 +42,17 @@ impl Effect for NonlinearViscousFriction {
         std: &[f64],
     ) -> Vec<Value> {
         vec![
-            value("torque_at_reference_speed", eta[0], std[0], cx.torque_unit(place[0])),
-            constant("reference_speed", cx.data.speed[place[0]], cx.speed_unit(place[0])),
+            value(
+                "torque_at_reference_speed",
+                eta[0],
+                std[0],
+                cx.torque_unit(place[0]),
+            ),
+            constant(
+                "reference_speed",
+                cx.data.speed[place[0]],
+                cx.speed_unit(place[0]),
+            ),
             constant("exponent", shape[0], ""),
         ]
     }

@@ -17,7 +17,11 @@ impl Effect for PassiveJointFriction {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { Vec::new() } else { vec![Vec::new()] }
+        if cx.serial() {
+            Vec::new()
+        } else {
+            vec![Vec::new()]
+        }
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
@@ -34,7 +38,9 @@ impl Effect for PassiveJointFriction {
             let passive = |c: usize| {
                 !mechanism.actuated.contains(&c)
                     && mechanism.robot.joints[c].motion == Motion::Revolute
-                    && !mechanism.task_names.contains(&mechanism.robot.joints[c].name)
+                    && !mechanism
+                        .task_names
+                        .contains(&mechanism.robot.joints[c].name)
             };
             for (which, column) in columns.iter_mut().enumerate() {
                 let mut gamma = vec![0.0; tree.dof * r.count];

@@ -23,7 +23,9 @@ impl Effect for PositionDependentFriction {
     fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
         let [a, b] = cx.data.range[place[0]];
         match cx.motion(place[0]) {
-            Motion::Revolute => [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0].map(|k| vec![k]).to_vec(),
+            Motion::Revolute => [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0]
+                .map(|k| vec![k])
+                .to_vec(),
             Motion::Prismatic => ladder(1.5, 16.0, 7)
                 .into_iter()
                 .map(|k| vec![k / (b - a).max(1e-9)])

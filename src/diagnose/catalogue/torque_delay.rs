@@ -64,7 +64,12 @@ impl Effect for TorqueDelay {
         eta: &[f64],
         std: &[f64],
     ) -> Vec<Value> {
-        vec![value("delay", shape[0] * eta[0], (shape[0] * std[0]).abs(), "s")]
+        vec![value(
+            "delay",
+            shape[0] * eta[0],
+            (shape[0] * std[0]).abs(),
+            "s",
+        )]
     }
 }
 

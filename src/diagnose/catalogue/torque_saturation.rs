@@ -22,7 +22,9 @@ impl Effect for TorqueSaturation {
 
     fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
         // above 1 an exponent, below 1 the limit as a share of the peak
-        [2.0, 3.0, 5.0, 0.4, 0.55, 0.7, 0.85].map(|e| vec![e]).to_vec()
+        [2.0, 3.0, 5.0, 0.4, 0.55, 0.7, 0.85]
+            .map(|e| vec![e])
+            .to_vec()
     }
 
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {

@@ -17,7 +17,11 @@ impl Effect for TransmissionError {
         }
     }
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() { cx.singles() } else { Vec::new() }
+        if cx.serial() {
+            cx.singles()
+        } else {
+            Vec::new()
+        }
     }
 
     fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
@@ -61,8 +65,18 @@ impl Effect for TransmissionError {
             Motion::Prismatic => "rad/m",
         };
         vec![
-            value("amplitude", scale * amplitude, scale * std[0].max(std[1]), unit),
-            value("phase", eta[1].atan2(eta[0]), std[0].max(std[1]) / amplitude.max(1e-300), "rad"),
+            value(
+                "amplitude",
+                scale * amplitude,
+                scale * std[0].max(std[1]),
+                unit,
+            ),
+            value(
+                "phase",
+                eta[1].atan2(eta[0]),
+                std[0].max(std[1]) / amplitude.max(1e-300),
+                "rad",
+            ),
             constant("per_position", shape[0], per),
         ]
     }
