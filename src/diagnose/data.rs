@@ -1,5 +1,8 @@
 //! All records side by side, and the columns that live on them.
 
+// several arrays share the index of an actuator
+#![allow(clippy::needless_range_loop)]
+
 use super::noise::{LINES, Noise, between_periods, spectrum};
 use super::record::Record;
 use crate::dynamics::Samples;

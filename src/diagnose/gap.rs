@@ -174,8 +174,8 @@ pub fn shares(data: &Data, residual: &[Vec<f64>]) -> Shares {
     }
     let within = (repeating / total) / (odd + even).max(1e-300);
     Shares {
-        odd: (halves > 0.0).then(|| odd * within),
-        even: (halves > 0.0).then(|| even * within),
+        odd: (halves > 0.0).then_some(odd * within),
+        even: (halves > 0.0).then_some(even * within),
         non_periodic: Some(other / total),
     }
 }

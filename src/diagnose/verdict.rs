@@ -93,7 +93,7 @@ pub struct Decision {
 const LEAST: f64 = 0.06;
 /// Gap per row below which there is none: what windows, encoders and the shape of friction at
 /// reversals leave of a sound model.
-const SOUND: f64 = 0.25;
+const SOUND: f64 = 0.5;
 /// Imperfection of a sound model, per row, that counts neither for nor against an effect.
 const SLACK: f64 = 0.05;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
@@ -141,7 +141,7 @@ impl State<'_> {
     }
 
     /// Improves the shapes of all members in turn.
-    fn polish(&self, set: &mut Vec<Candidate>) {
+    fn polish(&self, set: &mut [Candidate]) {
         for i in 0..set.len() {
             let others: Vec<Candidate> = others(set, i);
             let beside: Vec<&Projected> = others.iter().map(|c| &c.projected).collect();
