@@ -41,6 +41,7 @@ fn truth(name: &str, seed: u64) -> (Plant, Vec<f64>) {
 
 /// Periods of a Fourier motion of harmonics 1 to 5 of 5 s, with the torques of `phi` and noise of
 /// AR(1) with this standard deviation; with rates where they are asked for.
+#[derive(Clone, Copy)]
 struct Run {
     periods: usize,
     rate: f64,
@@ -161,7 +162,7 @@ fn worst(id: &Identification, phi: &[f64], pi: &[f64]) -> f64 {
 
 #[test]
 fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
-    for name in excite::robot::bundled::names() {
+    for name in excite::robot::bundled::list().iter().map(|b| b.name) {
         let plant = Plant::load(name).unwrap();
         if plant.mechanism().is_some() {
             continue;
@@ -193,6 +194,77 @@ fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
     }
 }
 
+/// The same for closed chains, from the positions of the actuators alone: forward kinematics, periods.
+#[test]
+fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise() {
+    for name in excite::mechanism::bundled::list().iter().map(|b| b.name) {
+        let plant = Plant::load(name).unwrap();
+        let Some(mechanism) = plant.mechanism() else {
+            continue;
+        };
+        let mut phi = plant.values();
+        phi.iter_mut().for_each(|x| *x *= 1.1);
+        let (period, rate) = (5.0, 100.0);
+        let (m, n, each) = (plant.coordinates(), plant.actuators().len(), 500);
+        let r = &mut rng(21);
+        let mut x = excite::dynamics::Samples::zeros(m, each);
+        for k in 0..m {
+            let [low, high] = mechanism.workspace[k].position;
+            let half = 0.5 * (high - low).min(1.0);
+            for h in 1..=4 {
+                let w = f64::from(h) * 2.0 * PI / period;
+                let (a, p) = (half * r.random_range(0.05..0.2), r.random_range(0.0..6.28));
+                for i in 0..each {
+                    let t = i as f64 / rate;
+                    x.q[k * each + i] += a * (w * t + p).sin();
+                    x.qd[k * each + i] += a * w * (w * t + p).cos();
+                    x.qdd[k * each + i] -= a * w * w * (w * t + p).sin();
+                }
+            }
+            let middle = mechanism.home[k];
+            x.q[k * each..(k + 1) * each]
+                .iter_mut()
+                .for_each(|v| *v += middle);
+        }
+        let tau = plant.torque(&x, &phi).unwrap();
+        let q = plant.actuator_motion(&x).unwrap().q;
+        let twice = |list: &[f64]| -> Vec<Vec<f64>> {
+            let rows = list.chunks_exact(each);
+            rows.map(|row| [row, row].concat()).collect()
+        };
+        let record = Record {
+            name: name.into(),
+            path: PathBuf::from("made.csv"),
+            purpose: Purpose::Fit,
+            period: Some(period),
+            payload: Payload::None,
+            step: 1.0 / rate,
+            t: (0..2 * each).map(|i| i as f64 / rate).collect(),
+            valid: vec![true; 2 * each],
+            q: twice(&q),
+            tau: twice(&tau),
+            dq: None,
+            ddq: None,
+            qref: None,
+            ql: None,
+            pose: None,
+            pressures: None,
+            resampled: false,
+            warnings: Vec::new(),
+        };
+        assert_eq!(record.actuators(), n);
+        let settings = Settings {
+            prior_strength: Some(1e-2),
+            ..Settings::default()
+        };
+        let id = identify(&plant, &[record], &settings).unwrap();
+        let e = worst(&id, &phi, &id.pi);
+        println!("{name}: {e:.1e}");
+        assert!(e < 1e-8, "{name}: {e:.2e}");
+        assert!(id.consistent, "{name}: {:?}", id.margin);
+    }
+}
+
 /// 95 % intervals hold the truth in 95 % of the runs, with white noise and with correlated noise.
 #[test]
 fn intervals_cover() {
@@ -204,7 +276,7 @@ fn intervals_cover() {
                 noise: 0.3,
                 memory,
                 seed: 100 + seed,
-                periods: 1,
+                periods: 4,
                 rate: 400.0,
                 ..Run::default()
             };
@@ -514,4 +586,84 @@ fn tx40_is_better_than_plain_least_squares_and_says_what_is_left() {
         "{:?}",
         v.followers
     );
+}
+
+/// The program: files, exit status, nothing replaced, and a robot.toml that is the model.
+#[test]
+fn the_command_writes_a_model_that_is_the_model() {
+    let dir = tempfile::tempdir().unwrap();
+    let (plant, phi) = truth("planar2", 6);
+    let run = Run {
+        noise: 0.05,
+        periods: 3,
+        ..Run::default()
+    };
+    for (name, motion) in [("fit", 11), ("holdout", 12)] {
+        let r = record(&plant, &phi, Purpose::Fit, &Run { motion, ..run });
+        let mut text = String::from("t,q1,q2,tau1,tau2\n");
+        for i in 0..r.len() {
+            text += &format!(
+                "{},{},{},{},{}\n",
+                r.t[i], r.q[0][i], r.q[1][i], r.tau[0][i], r.tau[1][i]
+            );
+        }
+        std::fs::write(dir.path().join(format!("{name}.csv")), text).unwrap();
+    }
+    let experiment = dir.path().join("experiment.toml");
+    std::fs::write(
+        &experiment,
+        "robot = \"planar2\"\n[[record]]\nlog = \"fit.csv\"\nuse = \"fit\"\nperiod = 5.0\n[[record]]\n\
+         log = \"holdout.csv\"\nuse = \"holdout\"\n",
+    )
+    .unwrap();
+    let out = dir.path().join("out");
+    let excite = |more: &[&str]| {
+        let mut c = assert_cmd::Command::cargo_bin("excite").unwrap();
+        c.arg("identify").arg(&experiment).arg("--output").arg(&out);
+        c.args(["--identify", "armature,viscous,coulomb,offset"])
+            .args(more);
+        c
+    };
+    excite(&[]).assert().success();
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+    assert!(
+        report["validation"]["holdout"]["relative_error"]
+            .as_f64()
+            .unwrap()
+            < 0.01
+    );
+    assert_eq!(report["physically_consistent"], true);
+    let base = report["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|p| p["kind"] == "base")
+        .count();
+    assert_eq!(report["base_parameters"], base);
+    // the written robot has the torques of the model
+    let model: serde_json::Value = serde_json::from_str(&read("model.json")).unwrap();
+    let values: Vec<f64> = model["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["value"].as_f64().unwrap())
+        .collect();
+    let written = Plant::load(out.join("robot.toml").to_str().unwrap()).unwrap();
+    let states = plant.random_states(40, 5);
+    let (a, b) = (
+        plant.torque(&states, &values).unwrap(),
+        written.nominal_torque(&states).unwrap(),
+    );
+    for (a, b) in a.iter().zip(&b) {
+        assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
+    }
+    assert!(read("robot.xml").contains("frictionloss") && read("report.html").contains("</html>"));
+    // nothing is replaced without --force
+    excite(&[]).assert().code(1);
+    excite(&["--force", "--method", "robust"])
+        .assert()
+        .success();
+    excite(&["--force", "--method", "magic"]).assert().code(2);
+    excite(&["--force", "--prior", "-1"]).assert().code(2);
 }

@@ -202,7 +202,11 @@ fn what_is_no_log_is_an_error_with_its_place() {
             .map(|_| "1")
             .collect::<Vec<_>>()
             .join(",");
-        std::fs::write(&path, format!("{header}\n{row}\n{row}\n")).unwrap();
+        std::fs::write(
+            &path,
+            format!("{header}\n{}", format!("{row}\n").repeat(10)),
+        )
+        .unwrap();
         let e = error(path);
         assert!(e.contains(word) && e.contains("line 1"), "{header}: {e}");
     }
@@ -255,7 +259,7 @@ fn an_experiment_is_read_with_its_records() {
     let path = dir.path().join("experiment.toml");
     let write = |text: &str| std::fs::write(&path, text).unwrap();
     write(
-        "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiod = 6.283185307179586\n\
+        "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiod = std::f64::consts::TAU\n\
          [[record]]\nlog = \"two.csv\"\nuse = \"holdout\"\npayload = { mass = 2.0, com = [0, 0, 0.05] }\n",
     );
     let e = Experiment::read(&path).unwrap();
@@ -267,7 +271,7 @@ fn an_experiment_is_read_with_its_records() {
     ));
     // 6.283 s are 3141.59 steps of 2 ms: the grid is made to divide the period
     let r = &e.records[0];
-    assert!((r.step * 3142.0 - 6.283185307179586).abs() < 1e-12);
+    assert!((r.step * 3142.0 - std::f64::consts::TAU).abs() < 1e-12);
     assert_eq!(r.periods(), Some((3142, 1)));
     for (text, word) in [
         (

@@ -210,8 +210,8 @@ fn the_cutoff_lies_where_motion_sinks_into_noise() {
             (2.0 * PI * 0.7 * t).sin() + 0.1 * (2.0 * PI * 6.0 * t).sin() + 1e-5 * noise
         })
         .collect();
-    let c = cutoff::aperiodic(&q, rate);
-    assert!((6.0..12.0).contains(&c.frequency), "{}", c.frequency);
+    let c = cutoff::aperiodic(&q, rate, 4);
+    assert!((12.0..40.0).contains(&c.frequency), "{}", c.frequency);
     let truth = 2.0 * 1e-10 / rate;
     assert!(
         (0.5 * truth..2.0 * truth).contains(&c.floor),

@@ -123,8 +123,8 @@ fn energy_balance() {
         // Simpson over an even number of intervals
         let m = (n - 1) / 2 * 2;
         let mut work = power[0] + power[m];
-        for k in 1..m {
-            work += power[k] * if k % 2 == 1 { 4.0 } else { 2.0 };
+        for (k, p) in power.iter().enumerate().take(m).skip(1) {
+            work += p * if k % 2 == 1 { 4.0 } else { 2.0 };
         }
         work /= 3.0 * 2000.0;
         let top = kinetic.iter().cloned().fold(0.0, f64::max);

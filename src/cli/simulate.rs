@@ -318,7 +318,10 @@ fn summary(plant: &Plant, run: &Run, args: &Args, periods: u32, period: f64) -> 
 
 /// Writes the experiment, or one more record of it.
 fn experiment(path: &Path, args: &Args, period: f64, periods: u32) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
     let relative = |file: &Path| -> String {
         let absolute = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
         let base = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());

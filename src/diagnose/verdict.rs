@@ -94,6 +94,8 @@ const LEAST: f64 = 0.06;
 /// Gap per row below which there is none: what windows, encoders and the shape of friction at
 /// reversals leave of a sound model.
 const SOUND: f64 = 0.5;
+/// Gap per row that a sound model leaves: shares of the gap are of what lies above.
+const FLOOR: f64 = 0.25;
 /// Imperfection of a sound model, per row, that counts neither for nor against an effect.
 const SLACK: f64 = 0.05;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
@@ -103,6 +105,8 @@ struct State<'a> {
     evidence: &'a Evidence<'a>,
     cx: &'a Context<'a>,
     effects: &'a [Box<dyn Effect>],
+    /// what a sound model leaves, per row
+    floor: f64,
 }
 
 impl State<'_> {
@@ -120,6 +124,18 @@ impl State<'_> {
             .into_iter()
             .map(|[a, b]| a + b)
             .collect()
+    }
+
+    /// Gap of all actuators above what a sound model leaves.
+    fn above(&self, gap: &[f64], fitted: bool) -> f64 {
+        let data = self.evidence.data;
+        let rows = match fitted {
+            true => data.fitted,
+            false => data.rows() - data.fitted,
+        };
+        gap.iter()
+            .map(|v| (v - self.floor * rows as f64).max(0.0))
+            .sum()
     }
 
     /// Penalty of the prior with a set.
@@ -253,10 +269,11 @@ pub fn decide(
     list: &[Candidate],
     progress: &dyn Fn(&str),
 ) -> Decision {
-    let st = State {
+    let mut st = State {
         evidence,
         cx,
         effects,
+        floor: 0.0,
     };
     let data = evidence.data;
     let rows = data.fitted as f64;
@@ -265,7 +282,10 @@ pub fn decide(
     let hold_before = st.gap(&residual, false);
     let surprise = st.surprise(&none, &residual);
     let free = data.parameters.len() as f64;
-    let total: f64 = before.iter().map(|v| v.max(0.0)).sum::<f64>();
+    // no more than a part of a gap that is small itself
+    let largest = before.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+    st.floor = FLOOR.min(0.3 * largest);
+    let total = st.above(&before, true);
     let visible = before.iter().any(|v| *v > SOUND * rows);
     let surprising = surprise > SURPRISE + 2.0 * free;
     let mut set: Vec<Candidate> = Vec::new();
@@ -344,15 +364,14 @@ pub fn decide(
         at += k;
     }
     members.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-    let positive = |v: &[f64]| v.iter().map(|v| v.max(0.0)).sum::<f64>();
     // an effect that hides in the parameters is measured against the frozen model
     let hides = members.iter().any(|m| m.frozen);
-    let whole = |fit: bool| positive(&st.gap(&evidence.r, fit));
+    let whole = |fit: bool| st.above(&st.gap(&evidence.r, fit), fit);
     let [base, base_held] = match hides {
         true => [whole(true), whole(false)],
-        false => [total, positive(&hold_before)],
+        false => [total, st.above(&hold_before, false)],
     };
-    let unexplained = (positive(&after) / base.max(1e-9)).min(1.0);
+    let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
     let claims = members.iter().filter(|m| m.confidence >= 0.5).count();
     let gap_left = after.iter().any(|v| *v > SOUND * rows);
     let verdict = match (visible || surprising, claims) {
@@ -367,7 +386,7 @@ pub fn decide(
         fit,
         before,
         after,
-        holdout: [base_held, positive(&hold_after)],
+        holdout: [base_held, st.above(&hold_after, false)],
         surprise: [surprise, surprise_after],
         unexplained,
     }
@@ -568,22 +587,17 @@ fn judge(
             .map(|x| (0..e.len()).map(|y| e[x] * m[(x, y)] * e[y]).sum::<f64>())
             .sum()
     };
-    let all_without: f64 = without.iter().map(|v| v.max(0.0)).sum();
-    let all_after: f64 = after.iter().map(|v| v.max(0.0)).sum();
+    let all_without = st.above(&without, true);
+    let all_after = st.above(after, true);
     // an effect that hides in the parameters: what the frozen model lacks
-    let whole =
-        |e: &[Vec<f64>], fit: bool| -> f64 { st.gap(e, fit).iter().map(|v| v.max(0.0)).sum() };
+    let whole = |e: &[Vec<f64>], fit: bool| st.above(&st.gap(e, fit), fit);
     let explains = if frozen {
         1.0 - all_after / whole(&st.evidence.r, true).max(1e-9)
     } else {
         (all_without - all_after) / total.max(1e-9)
     };
-    let hold_total: f64 = st
-        .gap(&st.fit(&[]).1, false)
-        .iter()
-        .map(|v| v.max(0.0))
-        .sum();
-    let hold_all = |r: &[Vec<f64>]| -> f64 { st.gap(r, false).iter().map(|v| v.max(0.0)).sum() };
+    let hold_all = |e: &[Vec<f64>]| st.above(&st.gap(e, false), false);
+    let hold_total = hold_all(&st.fit(&[]).1);
     let holdout = if held == 0 {
         explains
     } else if frozen {

@@ -72,5 +72,10 @@ pub fn solve(c: MatRef<'_, f64>, d: &[f64], prior: &Prior, gamma: f64) -> Result
             solution.status
         )));
     }
-    Ok((0..p).map(|i| s[i] * solution.x[i]).collect())
+    let mut phi: Vec<f64> = (0..p).map(|i| s[i] * solution.x[i]).collect();
+    // inequalities hold to the tolerance of the solver only
+    for t in &prior.terms {
+        phi[t.unknown] = phi[t.unknown].max(0.0);
+    }
+    Ok(phi)
 }

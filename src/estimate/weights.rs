@@ -31,14 +31,15 @@ pub fn residual_covariance(stacks: &[&Stack], pi: &[f64]) -> Mat<f64> {
     })
 }
 
-/// Covariance with noise at least at rounding, so that a fit without residual has weights too.
+/// Covariance with noise of a millionth of the torque at least, so that a fit without residual has
+/// weights too, and a prior that can be felt.
 pub fn floored(mut c: Mat<f64>, stacks: &[&Stack]) -> Mat<f64> {
     for a in 0..c.nrows() {
         let size = stacks
             .iter()
             .flat_map(|s| s.measured[a * s.count..(a + 1) * s.count].iter())
             .fold(0.0f64, |m, x| m.max(x.abs()));
-        let least = (1e-10 * size.max(1e-6)).powi(2);
+        let least = (1e-6 * size.max(1e-6)).powi(2);
         if c[(a, a)] < least {
             for b in 0..c.nrows() {
                 c[(a, b)] = 0.0;

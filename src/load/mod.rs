@@ -26,6 +26,9 @@
 //! forces, so noise of the forces does not bias them, unlike the form in `1/m` of [`two_step`], the
 //! published estimator of Schulte & Gerland for platforms, which is reported beside it.
 
+// sums over samples and parameters, written with the indices of the equations
+#![allow(clippy::needless_range_loop)]
+
 pub mod body;
 pub mod gain;
 pub mod one_step;

@@ -72,12 +72,49 @@ pub fn stuck(
     moving: &[bool],
     valid: &mut [bool],
 ) -> Option<(usize, usize, usize)> {
+    let awake = |range: std::ops::Range<usize>| {
+        let length = range.len();
+        2 * moving[range].iter().filter(|m| **m).count() >= length
+    };
+    stuck_where(y, step, awake, valid)
+}
+
+/// Part of its whole range that a command must travel while an encoder stands still, for the
+/// encoder to be stuck: a joint held by its friction about a reversal stands still, too.
+const TRAVEL: f64 = 0.02;
+
+/// Runs of equal values of an encoder longer than a tenth of a second while the command goes on.
+/// Marks them and returns their number, samples and first index.
+pub fn stuck_encoder(
+    y: &[f64],
+    command: &[f64],
+    step: f64,
+    valid: &mut [bool],
+) -> Option<(usize, usize, usize)> {
+    let extent = |y: &[f64]| {
+        let (low, high) = y
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+                (a.min(x), b.max(x))
+            });
+        high - low
+    };
+    let enough = TRAVEL * extent(command);
+    let went_on = |range: std::ops::Range<usize>| extent(&command[range]) > enough;
+    stuck_where(y, step, went_on, valid)
+}
+
+fn stuck_where(
+    y: &[f64],
+    step: f64,
+    counts: impl Fn(std::ops::Range<usize>) -> bool,
+    valid: &mut [bool],
+) -> Option<(usize, usize, usize)> {
     let least = ((0.1 / step).ceil() as usize).max(20);
     let mut found: Option<(usize, usize, usize)> = None;
     for (start, length) in runs(y) {
         let range = start..start + length;
-        let awake = moving[range.clone()].iter().filter(|m| **m).count();
-        if length >= least && 2 * awake >= length {
+        if length >= least && counts(range.clone()) {
             valid[range].fill(false);
             let (n, samples, first) = found.unwrap_or((0, 0, start));
             found = Some((n + 1, samples + length, first));
@@ -129,16 +166,25 @@ pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
         ))
     };
     let revolute = joint.motion == Motion::Revolute;
-    if let Some(gear) = joint.gear_ratio.filter(|g| g.abs() > 1.5)
-        && bounded
-        && (fits(1.0 / gear) || fits(-1.0 / gear))
-    {
-        return text(
-            "which fits its limits only after division by the gear ratio: are they those of the motor?",
-        );
-    }
-    if revolute && high.abs().max(low.abs()) > 2.0 * PI && (fits(PI / 180.0) || !bounded) {
-        return text("which looks like degrees; radians are expected");
+    let geared = joint
+        .gear_ratio
+        .is_some_and(|gear| gear.abs() > 1.5 && bounded && (fits(1.0 / gear) || fits(-1.0 / gear)));
+    let degrees =
+        revolute && high.abs().max(low.abs()) > 2.0 * PI && (fits(PI / 180.0) || !bounded);
+    match (degrees, geared) {
+        (true, true) => {
+            return text(
+                "which fits its limits as degrees, or after division by the gear ratio as positions of \
+                 the motor; radians of the joint are expected",
+            );
+        }
+        (true, false) => return text("which looks like degrees; radians are expected"),
+        (false, true) => {
+            return text(
+                "which fits its limits only after division by the gear ratio: are they those of the motor?",
+            );
+        }
+        (false, false) => {}
     }
     if !revolute && fits(1e-3) {
         return text("which looks like millimetres; metres are expected");

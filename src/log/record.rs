@@ -289,8 +289,8 @@ impl Record {
             }
             // an encoder that stands still is stuck if the command goes on
             if let Some(qref) = &self.qref {
-                let awake = channels::moving(&qref[j], step);
-                if let Some(run) = channels::stuck(&self.q[j], step, &awake, &mut self.valid) {
+                let (q, qref) = (&self.q[j], &qref[j]);
+                if let Some(run) = channels::stuck_encoder(q, qref, step, &mut self.valid) {
                     self.warnings
                         .push(stuck(format!("{subject}: q{}", j + 1), run, step));
                 }
@@ -317,7 +317,8 @@ impl Record {
         if let Some(period) = self.period.filter(|p| *p > 2.0 * step) {
             step = period / (period / step).round();
         }
-        let count = ((last - first) / step + 1e-6).floor() as usize + 1;
+        // time stamps that jitter may miss the last point of the grid by some of a step
+        let count = ((last - first) / step + 0.1).floor() as usize + 1;
         let drift = (step - clock.step).abs() * count as f64;
         self.step = step;
         if clock.even && drift <= 0.02 * step && count >= clock.t.len() {

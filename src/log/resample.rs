@@ -9,7 +9,8 @@ pub enum Order {
     Cubic,
 }
 
-/// Values at times `to` of a channel with values `y` at increasing times `t`; constant outside.
+/// Values at times `to` of a channel with values `y` at increasing times `t`; continued
+/// by at most 0.15 of a step outside, constant from there.
 /// O(samples), both lists are walked once. `to` must be increasing.
 pub fn interpolate(t: &[f64], y: &[f64], to: &[f64], order: Order) -> Vec<f64> {
     let n = t.len();
@@ -40,7 +41,7 @@ pub fn interpolate(t: &[f64], y: &[f64], to: &[f64], order: Order) -> Vec<f64> {
                 i += 1;
             }
             let h = t[i + 1] - t[i];
-            let s = ((x - t[i]) / h).clamp(0.0, 1.0);
+            let s = ((x - t[i]) / h).clamp(-0.15, 1.15);
             match order {
                 Order::Linear => y[i] + s * (y[i + 1] - y[i]),
                 Order::Cubic => {

@@ -156,7 +156,8 @@ impl Loops {
                 .filter(|i| !held.contains(i))
                 .collect();
             match project(chain, &self.start, &free) {
-                Ok(q) if !stated || held.len() + self.rank(chain, &q) >= q.len() => return Ok(q),
+                Ok(q) if first.is_empty() || !stated => return Ok(q),
+                Ok(q) if held.len() + self.rank(chain, &q) >= q.len() => return Ok(q),
                 Ok(_) => {
                     return Err(format!(
                         "the loops cannot be closed with the actuated joints where `home` and \

@@ -172,7 +172,10 @@ impl Mechanism {
         }
         let workspace = (0..freedoms)
             .map(|k| {
+                let slides = |j: &usize| robot.joints[*j].motion == Motion::Prismatic;
+                let joint = geometry.task_joints().unwrap_or(&actuated).get(k);
                 let reach = match task {
+                    Task::Joints(_) if joint.is_some_and(slides) => 0.1,
                     Task::Joints(_) => 0.3,
                     _ if task.is_angle(k) => 0.25,
                     _ => 0.1,
@@ -226,6 +229,15 @@ impl Mechanism {
     /// Number of task coordinates.
     pub fn freedoms(&self) -> usize {
         self.task.count()
+    }
+
+    /// Whether task coordinate `k` is an angle: of the platform, or of a joint that turns.
+    pub fn is_angle(&self, k: usize) -> bool {
+        let joints = self.geometry.task_joints().unwrap_or(&self.actuated);
+        match (self.task, joints.get(k)) {
+            (Task::Joints(_), Some(&j)) => self.robot.joints[j].motion == Motion::Revolute,
+            (task, _) => task.is_angle(k),
+        }
     }
 
     /// The tree, as the kernels read it.

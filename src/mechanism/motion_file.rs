@@ -134,7 +134,7 @@ impl Mechanism {
                 .chain(POSE)
                 .map(str::to_string)
                 .collect();
-            return self.from_poses(path, &read_columns(path, &names)?);
+            return self.motion_of_poses(path, &read_columns(path, &names)?);
         }
         if !has("x") && has("q1") {
             return Err(Error::file(
@@ -161,7 +161,7 @@ impl Mechanism {
     }
 
     /// Task coordinates of poses: `t`, then the columns of [`POSE`].
-    fn from_poses(&self, path: &Path, columns: &[Vec<f64>]) -> Result<(Vec<f64>, Samples)> {
+    fn motion_of_poses(&self, path: &Path, columns: &[Vec<f64>]) -> Result<(Vec<f64>, Samples)> {
         let t = &columns[0];
         let mut motion = Samples::zeros(self.freedoms(), t.len());
         for s in 0..t.len() {

@@ -1,7 +1,7 @@
 //! Random states of a closed chain, and its base parameters from them.
 
+use super::Mechanism;
 use super::singularity::SINGULAR;
-use super::{Mechanism, Task};
 use crate::base::BaseParameters;
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -34,7 +34,7 @@ impl Mechanism {
             }
             for k in 0..m {
                 let w = &self.workspace[k];
-                let angle = self.task.is_angle(k) || matches!(self.task, Task::Joints(_));
+                let angle = self.is_angle(k);
                 let [v, a] = RATES[usize::from(angle)];
                 let finite = |x: f64, other: f64| match x.is_finite() && x > 0.0 {
                     true => x,

@@ -12,8 +12,11 @@ pub struct Cutoff {
     pub floor: f64,
 }
 
-/// Relative size below which a spectrum is rounding.
-const ROUNDING: f64 = 1e-28;
+/// Weight of what is lost of the signal against the noise that passes.
+const BIAS: f64 = 100.0;
+
+/// Relative size below which a spectrum is rounding, or the tolerance of forward kinematics (1e-12).
+const ROUNDING: f64 = 1e-24;
 
 /// Frequency that minimises the estimated mean square error of the acceleration: what passes of the
 /// noise plus what is lost of the signal. `density` and `noise` are of the position at `frequency`.
@@ -30,13 +33,26 @@ fn least_error(frequency: &[f64], density: &[f64], noise: impl Fn(usize) -> f64)
     at.max(1)
 }
 
+/// Median of a spectrum between 0.3 and 0.45 of the rate, as the mean of the exponential distribution
+/// that it is the median of.
+fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
+    let mut high: Vec<f64> = f
+        .iter()
+        .zip(density)
+        .filter(|(f, _)| (0.3 * rate..0.45 * rate).contains(f))
+        .map(|(_, d)| *d)
+        .collect();
+    high.sort_by(f64::total_cmp);
+    high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
+}
+
 /// Frequency below which 99.99 % of the power of the position's changes lies, Hz: the band of the
 /// motion. A hundredth of the amplitude lies above it.
 pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
     let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
     let length = ((20.0 * rate) as usize).clamp(64, difference.len().max(64));
     let (f, density) = welch(&difference, rate, length);
-    let position: Vec<f64> = f
+    let mut position: Vec<f64> = f
         .iter()
         .zip(&density)
         .map(|(f, d)| {
@@ -44,6 +60,11 @@ pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
             if *f > 0.0 { d / (gain * gain) } else { 0.0 }
         })
         .collect();
+    // noise is no motion
+    let floor = 2.0 * noise_floor(&f, &position, rate);
+    position
+        .iter_mut()
+        .for_each(|p| *p = if *p > floor { *p - floor } else { 0.0 });
     let total: f64 = position.iter().sum();
     let mut sum = 0.0;
     for (f, d) in f.iter().zip(&position) {
@@ -58,9 +79,13 @@ pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
 /// Cut-off of a motion that does not repeat. The noise floor is the median of the spectrum between
 /// 0.3 and 0.45 of the sampling rate, where the motion of a robot has nothing.
 ///
+/// `order` is that of one pass of the Butterworth filter, whose gain `1/(1 + (f/f_c)^{2N})` decides what
+/// passes. What is lost of the signal is the same in every sample and does not average out in the
+/// estimate as noise does; it counts a hundredfold.
+///
 /// The spectrum is that of the first difference (which has no trend to leak), divided by the
 /// difference's own.
-pub fn aperiodic(q: &[f64], rate: f64) -> Cutoff {
+pub fn aperiodic(q: &[f64], rate: f64, order: usize) -> Cutoff {
     let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
     // a tenth of a hertz to resolve the motion, and at least four windows to average
     let length = ((10.0 * rate) as usize).clamp(64, (q.len() / 2).max(64));
@@ -70,21 +95,45 @@ pub fn aperiodic(q: &[f64], rate: f64) -> Cutoff {
         *d /= (gain * gain).max(1e-300);
     }
     density[0] = 0.0;
-    let mut high: Vec<f64> = f
-        .iter()
-        .zip(&density)
-        .filter(|(f, _)| (0.3 * rate..0.45 * rate).contains(f))
-        .map(|(_, d)| *d)
-        .collect();
-    high.sort_by(f64::total_cmp);
     let largest = density.iter().cloned().fold(0.0, f64::max);
-    // mean of an exponential distribution from its median
-    let floor = high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2;
-    let floor = floor.max(ROUNDING * largest);
-    let k = least_error(&f, &density, |_| floor);
-    // above what was estimated as noise nothing can be seen
+    let floor = noise_floor(&f, &density, rate).max(ROUNDING * largest);
+    // a line of noise here and there is no signal: means over neighbours decide
+    let mut sums = vec![0.0];
+    for d in &density {
+        sums.push(sums[sums.len() - 1] + d);
+    }
+    let smooth = |k: usize| {
+        let wide = 3 + k / 16;
+        let (a, b) = (
+            k.saturating_sub(wide).max(1),
+            (k + wide + 1).min(density.len()),
+        );
+        (sums[b] - sums[a]) / (b - a).max(1) as f64
+    };
+    let signal: Vec<f64> = (0..density.len())
+        .map(|k| match k > 0 && smooth(k) > 2.0 * floor {
+            true => (density[k] - floor).max(0.0),
+            false => 0.0,
+        })
+        .collect();
+    // grid of 16 cut-offs an octave, from the second bin to what was taken for noise
+    let (low, high) = (f.get(2).copied().unwrap_or(0.0), 0.3 * rate);
+    let mut best = (f64::INFINITY, high);
+    let mut cutoff = high;
+    while cutoff > low && low > 0.0 {
+        let mut error = 0.0;
+        for (f, signal) in f.iter().zip(&signal).skip(1) {
+            let gain = 1.0 / (1.0 + (f / cutoff).powi(2 * order as i32));
+            let w4 = f.powi(4);
+            error += w4 * (gain * gain * floor + BIAS * (1.0 - gain).powi(2) * signal);
+        }
+        if error < best.0 {
+            best = (error, cutoff);
+        }
+        cutoff *= 0.5f64.powf(1.0 / 16.0);
+    }
     Cutoff {
-        frequency: f[k].min(0.3 * rate),
+        frequency: best.1,
         floor,
     }
 }

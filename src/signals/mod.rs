@@ -10,10 +10,13 @@
 //! mean square error of the acceleration,
 //!
 //! ```text
-//! MSE(f_c) = Σ_{f ≤ f_c} S_n(f) ω⁴ + Σ_{f > f_c} max(S_q(f) − S_n(f), 0) ω⁴
+//! MSE(f_c) = Σ_f [ G² S_n(f) + β (1 − G)² (S_q(f) − S_n(f)) ] ω⁴
 //! ```
 //!
-//! with the spectrum `S_q` of the positions and its noise floor `S_n`, from the scatter of the periods
+//! with the gain `G` of the filter at this cut-off (`β = 100` for the Butterworth filter, whose roll-off is
+//! gradual: what it takes from the motion does not average out; 1 for whole harmonics, of which none is
+//! changed),
+//! the spectrum `S_q` of the positions and its noise floor `S_n`, from the scatter of the periods
 //! or from the highest frequencies. The parallel filter ([`Decimator`]), which all columns of `W` and
 //! `τ` pass, has its cut-off at ten times the bandwidth of the motion ([`common_cutoff`]); the
 //! positions are cut off at 2.5 times that at most.

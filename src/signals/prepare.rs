@@ -23,11 +23,27 @@ const MARGIN: f64 = 2.5;
 /// torque has twice the frequencies of the motion and friction its harmonics; what lies beyond is drive
 /// and structure.
 pub fn common_cutoff<'a>(records: impl IntoIterator<Item = &'a Record>) -> f64 {
-    records
-        .into_iter()
-        .flat_map(|r| r.q.iter().map(|q| cutoff::bandwidth(q, r.rate())))
-        .fold(0.0, f64::max)
-        * BANDS
+    let mut highest = 0.0f64;
+    for r in records {
+        let spread = |q: &[f64]| {
+            let (low, high) = q
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+                    (a.min(x), b.max(x))
+                });
+            high - low
+        };
+        let most = r.q.iter().map(|q| spread(q)).fold(0.0, f64::max);
+        // a joint that is held still moves with noise alone
+        let moving: Vec<&Vec<f64>> = r.q.iter().filter(|q| spread(q) > 1e-3 * most).collect();
+        highest = moving
+            .par_iter()
+            .map(|q| cutoff::bandwidth(q, r.rate()))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .fold(highest, f64::max);
+    }
+    BANDS * highest
 }
 
 /// Positions of the coordinates and their two derivatives.
@@ -71,7 +87,7 @@ impl Prepared {
                 let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
                 let frequency = match settings.position_cutoff {
                     Some(f) => f,
-                    None => cutoff::aperiodic(q, rate)
+                    None => cutoff::aperiodic(q, rate, settings.order)
                         .frequency
                         .min(most)
                         .min(0.45 * rate),

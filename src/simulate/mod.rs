@@ -284,7 +284,14 @@ impl Simulator<'_> {
             now.broken.clear();
             let next = self.runge_kutta(t, &now, left)?;
             let Some((j, guess)) = self.crossing(&now, &next) else {
-                return Ok(next);
+                if next.broken.is_empty() {
+                    return Ok(next);
+                }
+                // what has broken away slides from here on, in the log as well
+                for &(j, positive) in &next.broken {
+                    self.modes[j] = Mode::Slides(positive);
+                }
+                return self.evaluate(t + left, &next.x, &next.xd);
             };
             let mut part = 0.0;
             if guess > 0.0 {

@@ -191,7 +191,7 @@ fn poses(plant: &Plant, run: &Run) -> Result<Vec<Vec<f64>>> {
     };
     let m = run.motion.dof;
     let zero = vec![0.0; m];
-    let mut columns = vec![Vec::with_capacity(count); 7];
+    let mut columns: Vec<Vec<f64>> = (0..7).map(|_| Vec::with_capacity(count)).collect();
     let mut last: Option<UnitQuaternion<f64>> = None;
     for k in 0..count {
         let x: Vec<f64> = (0..m).map(|c| run.motion.q[c * count + k]).collect();

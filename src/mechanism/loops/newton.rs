@@ -110,7 +110,7 @@ impl Closing {
         let (n, m) = (q.len(), self.independent.len());
         let solver = LeastSquares::new(j.select_columns(&self.passive));
         let (low, high) = solver.range();
-        if !(low > HELD * high) {
+        if low.is_nan() || low <= HELD * high {
             return Err(format!(
                 "the passive joints are not held there: pivots of their closures from {low:.1e} \
                  to {high:.1e}"
@@ -211,7 +211,7 @@ impl Closing {
             let step = self.passive_part(&at, r.as_slice());
             let size = self.chain.scaled_step(&step);
             corrected += size;
-            if !(corrected <= 0.5 * expected + 1e-3) {
+            if corrected.is_nan() || corrected > 0.5 * expected + 1e-3 {
                 return Err(format!(
                     "the assembly mode may jump: Newton moves the joints by {corrected:.3}, the \
                      tangent by {expected:.3}"
