@@ -1,5 +1,8 @@
 //! All records side by side, and the columns that live on them.
 
+// several arrays share the index of an actuator
+#![allow(clippy::needless_range_loop)]
+
 use super::noise::{LINES, Noise, between_periods, spectrum};
 use super::record::Record;
 use crate::dynamics::Samples;
@@ -285,9 +288,12 @@ impl<'a> Data<'a> {
     }
 
     fn first_noise(&self, j: usize) -> Noise {
+        // holdout records may hold what the fitted ones do not: only where those do not repeat
+        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
         let parts: Vec<(Vec<f64>, f64)> = self
             .records
             .iter()
+            .filter(|r| r.fit || !repeats)
             .filter_map(|r| Some((between_periods(r, r.torque(j))?, r.dt)))
             .collect();
         if !parts.is_empty() {
@@ -306,7 +312,9 @@ impl<'a> Data<'a> {
     /// Spectrum of the torque that unresolved acceleration makes.
     fn position_excess(&self, j: usize) -> Vec<f64> {
         let mut out = vec![0.0; LINES + 1];
-        let records: Vec<&Record> = self.records.iter().filter(|r| r.cycle.is_some()).collect();
+        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
+        let counts = |r: &&Record| r.cycle.is_some() && (r.fit || !repeats);
+        let records: Vec<&Record> = self.records.iter().filter(counts).collect();
         for r in &records {
             let variance = (self.inertia[j] * r.position_noise[j]).powi(2) / records.len() as f64;
             for (l, out) in out.iter_mut().enumerate() {

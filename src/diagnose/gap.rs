@@ -21,7 +21,7 @@ pub struct JointGap {
     pub noise: f64,
     /// share of the gap of the whole robot, weighted by noise
     pub share: f64,
-    /// residual over measured torque, rms
+    /// residual over measured torque, rms, both low-passed at about 20 Hz
     pub relative: f64,
 }
 
@@ -102,11 +102,18 @@ pub fn joints(
     let names = data.plant.actuators();
     let mut out: Vec<JointGap> = (0..data.joints())
         .map(|j| {
-            let (mut sum, mut count, mut torque) = (0.0, 0.0, 0.0);
+            let (mut sum, mut count, mut torque, mut filtered) = (0.0, 0.0, 0.0, 0.0);
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| pick(r)) {
-                sum += residual[j][data.span(k)].iter().map(|v| v * v).sum::<f64>();
-                torque += r.torque(j).iter().map(|v| v * v).sum::<f64>();
+                let e = &residual[j][data.span(k)];
+                sum += e.iter().map(|v| v * v).sum::<f64>();
                 count += r.count as f64;
+                // relative errors below about 20 Hz, torque and residual filtered alike
+                let w = ((0.024 / r.dt).round() as usize).max(1);
+                let low = |x: &[f64]| -> f64 {
+                    super::record::triangle(x, w).iter().map(|v| v * v).sum()
+                };
+                filtered += low(e);
+                torque += low(r.torque(j));
             }
             let noise = data.noise[j].std;
             JointGap {
@@ -116,7 +123,7 @@ pub fn joints(
                     .sqrt(),
                 noise,
                 share: 0.0,
-                relative: (sum / torque.max(1e-300)).sqrt(),
+                relative: (filtered / torque.max(1e-300)).sqrt(),
             }
         })
         .collect();
@@ -167,8 +174,8 @@ pub fn shares(data: &Data, residual: &[Vec<f64>]) -> Shares {
     }
     let within = (repeating / total) / (odd + even).max(1e-300);
     Shares {
-        odd: (halves > 0.0).then(|| odd * within),
-        even: (halves > 0.0).then(|| even * within),
+        odd: (halves > 0.0).then_some(odd * within),
+        even: (halves > 0.0).then_some(even * within),
         non_periodic: Some(other / total),
     }
 }

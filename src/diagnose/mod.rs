@@ -201,16 +201,50 @@ pub fn raw(experiment: &Experiment) -> Result<Vec<Raw>> {
                     r.path.display()
                 )));
             }
-            Ok(Raw {
+            let mut raw = Raw {
                 name: r.name.clone(),
                 fit: r.purpose == Purpose::Fit,
                 period: r.period,
                 t: r.t.clone(),
                 q: r.q.clone(),
                 tau: r.tau.clone(),
-            })
+            };
+            // stamps that jitter about a clock are not believed before the samples were compared
+            // both ways; interpolation to an even grid would smooth the torque for good
+            if let Some([t, q, tau]) = as_written(r) {
+                raw.t = t.into_iter().flatten().collect();
+                raw.q = q;
+                raw.tau = tau;
+            }
+            Ok(raw)
         })
         .collect()
+}
+
+/// Times, positions and torques as they stand in the file, where every value is sound and no sample
+/// is missing.
+fn as_written(r: &crate::log::Record) -> Option<[Vec<Vec<f64>>; 3]> {
+    let n = r.actuators();
+    let wanted = |name: &str| name == "t" || name.starts_with('q') || name.starts_with("tau");
+    let mut table = crate::log::Table::read(&r.path, &wanted).ok()?;
+    let mut take = |name: String| -> Option<Vec<f64>> {
+        let at = table.find(&name)?;
+        let column = std::mem::take(&mut table.columns[at]);
+        column.iter().all(|v| v.is_finite()).then_some(column)
+    };
+    let t = take("t".into())?;
+    let q = (1..=n)
+        .map(|j| take(format!("q{j}")))
+        .collect::<Option<_>>()?;
+    let tau = (1..=n)
+        .map(|j| take(format!("tau{j}")))
+        .collect::<Option<_>>()?;
+    let mean = (t.last()? - t.first()?) / (t.len() - 1).max(1) as f64;
+    let regular = t
+        .iter()
+        .enumerate()
+        .all(|(i, v)| (v - t[0] - i as f64 * mean).abs() < 0.5 * mean);
+    regular.then_some([vec![t], q, tau])
 }
 
 /// Records ready for the diagnosis: noise, window of the torque channel, ordinary imperfections.
@@ -364,7 +398,7 @@ pub fn of_logs(
         for r in &of.rivals {
             let (effect, card) = (effects[r.effect].as_ref(), effects[r.effect].card());
             let known = findings.iter().any(|f| f.effect == card.name);
-            if seen.len() >= 4 || seen.contains(&r.effect) || known {
+            if seen.len() >= 4 || r.weight < 0.01 || seen.contains(&r.effect) || known {
                 continue;
             }
             seen.push(r.effect);

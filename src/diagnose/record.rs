@@ -241,7 +241,7 @@ fn resample(t: &[f64], x: &[f64], mean: f64, dt: f64, count: usize, stamped: boo
 }
 
 /// Triangular moving average of half-width `w` samples.
-fn triangle(x: &[f64], w: usize) -> Vec<f64> {
+pub(crate) fn triangle(x: &[f64], w: usize) -> Vec<f64> {
     let n = x.len() as isize;
     let w = w as isize;
     (0..n)

@@ -34,6 +34,7 @@ impl Candidate {
 }
 
 /// Gain of one shape beside a fitted set.
+#[allow(clippy::too_many_arguments)]
 fn try_shape(
     evidence: &Evidence,
     cx: &Context,

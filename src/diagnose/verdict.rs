@@ -93,7 +93,9 @@ pub struct Decision {
 const LEAST: f64 = 0.06;
 /// Gap per row below which there is none: what windows, encoders and the shape of friction at
 /// reversals leave of a sound model.
-const SOUND: f64 = 0.25;
+const SOUND: f64 = 0.5;
+/// Gap per row that a sound model leaves: shares of the gap are of what lies above.
+const FLOOR: f64 = 0.25;
 /// Imperfection of a sound model, per row, that counts neither for nor against an effect.
 const SLACK: f64 = 0.05;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
@@ -103,6 +105,8 @@ struct State<'a> {
     evidence: &'a Evidence<'a>,
     cx: &'a Context<'a>,
     effects: &'a [Box<dyn Effect>],
+    /// what a sound model leaves, per row
+    floor: f64,
 }
 
 impl State<'_> {
@@ -120,6 +124,18 @@ impl State<'_> {
             .into_iter()
             .map(|[a, b]| a + b)
             .collect()
+    }
+
+    /// Gap of all actuators above what a sound model leaves.
+    fn above(&self, gap: &[f64], fitted: bool) -> f64 {
+        let data = self.evidence.data;
+        let rows = match fitted {
+            true => data.fitted,
+            false => data.rows() - data.fitted,
+        };
+        gap.iter()
+            .map(|v| (v - self.floor * rows as f64).max(0.0))
+            .sum()
     }
 
     /// Penalty of the prior with a set.
@@ -141,7 +157,7 @@ impl State<'_> {
     }
 
     /// Improves the shapes of all members in turn.
-    fn polish(&self, set: &mut Vec<Candidate>) {
+    fn polish(&self, set: &mut [Candidate]) {
         for i in 0..set.len() {
             let others: Vec<Candidate> = others(set, i);
             let beside: Vec<&Projected> = others.iter().map(|c| &c.projected).collect();
@@ -253,10 +269,11 @@ pub fn decide(
     list: &[Candidate],
     progress: &dyn Fn(&str),
 ) -> Decision {
-    let st = State {
+    let mut st = State {
         evidence,
         cx,
         effects,
+        floor: 0.0,
     };
     let data = evidence.data;
     let rows = data.fitted as f64;
@@ -265,7 +282,10 @@ pub fn decide(
     let hold_before = st.gap(&residual, false);
     let surprise = st.surprise(&none, &residual);
     let free = data.parameters.len() as f64;
-    let total: f64 = before.iter().map(|v| v.max(0.0)).sum::<f64>();
+    // no more than a part of a gap that is small itself
+    let largest = before.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+    st.floor = FLOOR.min(0.3 * largest);
+    let total = st.above(&before, true);
     let visible = before.iter().any(|v| *v > SOUND * rows);
     let surprising = surprise > SURPRISE + 2.0 * free;
     let mut set: Vec<Candidate> = Vec::new();
@@ -280,19 +300,6 @@ pub fn decide(
         let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
         let mut next = st.challengers(list, &beside, 10);
         next.retain(|c| !set.iter().any(|s| s.same(c)));
-        if std::env::var("EXCITE_DEBUG").is_ok() {
-            for c in &next {
-                eprintln!(
-                    "   step {} {} {:?} {:?} gain {:.0} merit {:.0}",
-                    set.len(),
-                    effects[c.effect].card().name,
-                    c.place,
-                    c.shape,
-                    c.gain,
-                    st.merit(c)
-                );
-            }
-        }
         let Some(best) = next.first().cloned() else {
             break;
         };
@@ -357,9 +364,14 @@ pub fn decide(
         at += k;
     }
     members.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-    let positive = |v: &[f64]| v.iter().map(|v| v.max(0.0)).sum::<f64>();
-    let left = positive(&after) + (surprise_after - free).max(0.0);
-    let unexplained = (left / (total + (surprise - free).max(0.0)).max(1e-9)).min(1.0);
+    // an effect that hides in the parameters is measured against the frozen model
+    let hides = members.iter().any(|m| m.frozen);
+    let whole = |fit: bool| st.above(&st.gap(&evidence.r, fit), fit);
+    let [base, base_held] = match hides {
+        true => [whole(true), whole(false)],
+        false => [total, st.above(&hold_before, false)],
+    };
+    let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
     let claims = members.iter().filter(|m| m.confidence >= 0.5).count();
     let gap_left = after.iter().any(|v| *v > SOUND * rows);
     let verdict = match (visible || surprising, claims) {
@@ -374,7 +386,7 @@ pub fn decide(
         fit,
         before,
         after,
-        holdout: [positive(&hold_before), positive(&hold_after)],
+        holdout: [base_held, st.above(&hold_after, false)],
         surprise: [surprise, surprise_after],
         unexplained,
     }
@@ -519,8 +531,11 @@ fn judge(
             white + 30.0
         };
         let loss = less / own.max(1e-9);
-        let weight = (left / (left + less.max(-0.5 * left))).powf(2.5).min(1.5);
-        if weight > 0.02 {
+        // and what each explains at all
+        let by_gain = (1.0 - loss).max(0.0).powi(6);
+        let by_left = (left / (left + less.max(-0.5 * left))).powf(2.5);
+        let weight = by_gain.min(by_left).min(1.5);
+        if loss < 0.98 {
             rivals.push(Rival {
                 effect: r.effect,
                 place: r.place.clone(),
@@ -546,29 +561,47 @@ fn judge(
     } else {
         logistic((chi_gain / rows - LEAST) / 0.02)
     };
-    let confidence =
-        size * logistic((share - 0.55) / 0.07) * logistic((hold - 0.3) / 0.07) / (1.0 + against);
+    // an effect that explains a part only is believed where nothing else comes near that part
+    let best = rivals
+        .iter()
+        .filter(|r| r.effect != c.effect && !exchangeable(st, c.effect, r.effect))
+        .fold(1.0f64, |m, r| m.min(r.loss));
+    let alone = logistic((best - 0.35) / 0.04) * logistic((share - 0.15) / 0.02);
+    // gain on holdout records per row against that on fitted ones: the same effect is at work there
+    let chi = |e: &[Vec<f64>]| -> f64 {
+        e.iter()
+            .map(|e| e[data.fitted..].iter().map(|v| v * v).sum::<f64>())
+            .sum()
+    };
+    let repeats = match held > 0 && !frozen {
+        true => (chi(&r0) - chi(&r1)) / held as f64 / (chi_gain / rows).max(1e-9),
+        false => 1.0,
+    };
+    let confidence = size
+        * logistic((share - 0.55) / 0.07).max(alone)
+        * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07))
+        / (1.0 + against);
     let quad = |m: &faer::Mat<f64>| -> f64 {
         let e = &c.eta;
         (0..e.len())
             .map(|x| (0..e.len()).map(|y| e[x] * m[(x, y)] * e[y]).sum::<f64>())
             .sum()
     };
-    let all_without: f64 = without.iter().map(|v| v.max(0.0)).sum();
-    let all_after: f64 = after.iter().map(|v| v.max(0.0)).sum();
+    let all_without = st.above(&without, true);
+    let all_after = st.above(after, true);
+    // an effect that hides in the parameters: what the frozen model lacks
+    let whole = |e: &[Vec<f64>], fit: bool| st.above(&st.gap(e, fit), fit);
     let explains = if frozen {
-        prior
+        1.0 - all_after / whole(&st.evidence.r, true).max(1e-9)
     } else {
         (all_without - all_after) / total.max(1e-9)
     };
-    let hold_total: f64 = st
-        .gap(&st.fit(&[]).1, false)
-        .iter()
-        .map(|v| v.max(0.0))
-        .sum();
-    let hold_all = |r: &[Vec<f64>]| -> f64 { st.gap(r, false).iter().map(|v| v.max(0.0)).sum() };
+    let hold_all = |e: &[Vec<f64>]| st.above(&st.gap(e, false), false);
+    let hold_total = hold_all(&st.fit(&[]).1);
     let holdout = if held == 0 {
         explains
+    } else if frozen {
+        1.0 - whole(&r1, false) / whole(&st.evidence.r, false).max(1e-9)
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
