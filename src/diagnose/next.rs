@@ -177,7 +177,7 @@ pub fn propose(
             grid,
             seed: settings.seed + k as u64,
             starts: Some(1),
-            time_limit: Some((settings.next_seconds / 5.0).max(0.5)),
+            time_limit: Some((settings.next_seconds / 4.0).max(0.5)),
             ends: crate::trajectory::Ends::Free,
             ..Design::default()
         };
@@ -190,11 +190,39 @@ pub fn propose(
             consider(t);
         }
     }
+    // and from the positions of the records, small enough to be inside all limits
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    for period in [4.0, 10.0, 24.0] {
+        let joints = data
+            .range
+            .iter()
+            .map(|[a, b]| {
+                let mut draw = |h: f64| (b - a) / 3.0 / h * rng.random_range(-1.0..1.0);
+                crate::trajectory::Series {
+                    constant: 0.5 * (a + b),
+                    sin: [1.0, 3.0, 5.0, 7.0].map(&mut draw).to_vec(),
+                    cos: [1.0, 3.0, 5.0, 7.0].map(&mut draw).to_vec(),
+                }
+            })
+            .collect();
+        let mut fourier = Fourier::new(period, vec![1, 3, 5, 7], joints)?;
+        for _ in 0..16 {
+            if certificate(&limited, &tree, &fourier).is_ok_and(|c| c.satisfied) {
+                let mut t = Trajectory::new(&limited, fourier);
+                t.periods = 3;
+                t.grid = Grid::Odd;
+                consider(t);
+                break;
+            }
+            for s in &mut fourier.joints {
+                s.sin.iter_mut().chain(&mut s.cos).for_each(|v| *v *= 0.8);
+            }
+        }
+    }
     let Some((mut lowest, mut trajectory)) = best else {
         return Ok(None);
     };
     // random steps inside the limits
-    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let mut step = 0.3;
     let mut tries = 0;
     while left() > 0.0 && tries < 60 && lowest > 0.02 {
