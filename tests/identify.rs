@@ -89,7 +89,7 @@ fn record(plant: &Plant, phi: &[f64], purpose: Purpose, run: &Run) -> Record {
                 (
                     f64::from(h) * 2.0 * PI / period,
                     half * r.random_range(0.1..0.4),
-                    r.random_range(0.0..6.28),
+                    r.random_range(0.0..std::f64::consts::TAU),
                 )
             })
             .collect();
@@ -213,7 +213,10 @@ fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise
             let half = 0.5 * (high - low).min(1.0);
             for h in 1..=4 {
                 let w = f64::from(h) * 2.0 * PI / period;
-                let (a, p) = (half * r.random_range(0.05..0.2), r.random_range(0.0..6.28));
+                let (a, p) = (
+                    half * r.random_range(0.05..0.2),
+                    r.random_range(0.0..std::f64::consts::TAU),
+                );
                 for i in 0..each {
                     let t = i as f64 / rate;
                     x.q[k * each + i] += a * (w * t + p).sin();
@@ -413,7 +416,7 @@ fn bodies_stay_possible_when_the_data_are_poor() {
             prior_strength: Some(1.0),
             ..Settings::default()
         };
-        let id = identify(&plant, &[r.clone()], &settings).unwrap();
+        let id = identify(&plant, std::slice::from_ref(&r), &settings).unwrap();
         assert!(id.consistent, "{consistency:?} {:?}", id.margin);
         let robot = robot::with_values(&plant, &id.phi);
         for b in &robot.bodies {

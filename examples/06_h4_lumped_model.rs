@@ -2,7 +2,7 @@
 //! of the model in which every rod is a body, and the torque error that remains; and the same with
 //! all rods, which remains with none.
 //!
-//! `cargo run --release --example 05_h4_lumped_model`
+//! `cargo run --release --example 06_h4_lumped_model`
 
 use excite::Result;
 use excite::dynamics::Samples;
