@@ -227,7 +227,7 @@ fn unusable_arguments_have_status_2() {
         ("design panda --start 9,0,0,-1,0,1,0", &["panda_joint1"]),
         ("design panda --identify friction", &["identify", "coulomb"]),
         ("design pandaa", &["pandaa", "panda"]),
-        ("identify panda", &["identify"]),
+        ("rehearse panda", &["rehearse"]),
     ] {
         t.fails(line, 2, words);
     }

@@ -259,7 +259,7 @@ fn an_experiment_is_read_with_its_records() {
     let path = dir.path().join("experiment.toml");
     let write = |text: &str| std::fs::write(&path, text).unwrap();
     write(
-        "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiod = std::f64::consts::TAU\n\
+        "robot = \"planar2\"\n[[record]]\nlog = \"one.csv\"\nuse = \"fit\"\nperiod = 6.283185307179586\n\
          [[record]]\nlog = \"two.csv\"\nuse = \"holdout\"\npayload = { mass = 2.0, com = [0, 0, 0.05] }\n",
     );
     let e = Experiment::read(&path).unwrap();

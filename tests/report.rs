@@ -218,14 +218,18 @@ fn a_motion_that_excites_nothing_is_called_so() {
         v.text
     );
     stands_alone(&html(&a, None));
-    check_json(&json(&a, None, 0.0), "", &["status", "starts", "percent"]);
+    check_json(
+        &json(&a, None, 0.0),
+        "",
+        &["status", "starts", "percent", "platform"],
+    );
 }
 
 #[test]
 fn the_json_has_its_keys_and_finite_numbers() {
     let a = panda();
     let j = json(&a, Some(&record()), 2.9);
-    check_json(&j, "", &["percent", "start"]);
+    check_json(&j, "", &["percent", "start", "platform"]);
     assert_eq!(j["robot"], "panda");
     assert_eq!(j["joints"][0], "panda_joint1");
     assert_eq!(j["base_parameters"], 43);
@@ -283,6 +287,7 @@ fn every_bundled_robot_alone_has_a_report() {
             "seed",
             "status",
             "starts",
+            "platform",
             "std",
             "percent",
         ];
@@ -344,7 +349,11 @@ fn numbers_that_are_not_finite_break_nothing() {
         let mut record = record();
         record.starts[1].history[2] = bad;
         stands_alone(&html(&a, Some(&record)));
-        check_json(&json(&a, Some(&record), bad), "", &["percent", "start"]);
+        check_json(
+            &json(&a, Some(&record), bad),
+            "",
+            &["percent", "start", "platform"],
+        );
     }
     let mut a = panda();
     let e = excitation(&mut a);

@@ -521,7 +521,7 @@ fn toml_errors_say_where_and_what_to_do() {
         (edit("gravity", "gravty"), &["line 3", "`gravty`"]),
         (
             edit("prior", "mechanism"),
-            &["mechanism", "parallel mechanisms: not supported"],
+            &["mechanism", "works with serial and tree robots only"],
         ),
         (
             edit("\"identified\"", "\"guess\""),

@@ -142,9 +142,15 @@ impl Mechanism {
                 .sqrt()
         };
         let mut error = (goal - &q).amax();
+        // one step more than the tolerance asks for: positions that are differentiated later want
+        // the last digits
+        let mut polished = false;
         for _ in 0..30 {
             if error <= TOLERANCE * (1.0 + goal.amax()) {
-                break;
+                if polished {
+                    break;
+                }
+                polished = true;
             }
             *iterations += 1;
             let step = solve(&j, &(goal - &q))?;
