@@ -1,6 +1,8 @@
 //! The diagnosis on small simulated runs whose formulas are not those of its catalogue, and on
 //! recordings of real robots and a withheld set where they are at hand.
 
+#![allow(clippy::type_complexity)] // motions and laws are closures
+
 use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, Verdict, diagnose, json, of_logs, page};
 use excite::dynamics::{Samples, Tree};
