@@ -31,7 +31,7 @@ fn motion(plant: &Plant, seed: u64) -> Samples {
             let (w, a, p) = (
                 f64::from(h) * 2.0 * PI / PERIOD,
                 r.random_range(0.1..0.4),
-                r.random_range(0.0..6.28),
+                r.random_range(0.0..std::f64::consts::TAU),
             );
             for i in 0..count {
                 let t = i as f64 / RATE;
