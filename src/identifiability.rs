@@ -164,23 +164,7 @@ impl Assessment {
     /// As [`BaseParameters::new`].
     pub fn of_robot(robot: &Robot) -> Result<Self> {
         let base = BaseParameters::new(robot)?;
-        let (torque_noise, more) = torque_noise(robot);
-        let warnings = robot
-            .warnings
-            .iter()
-            .chain(&base.warnings)
-            .cloned()
-            .chain(more)
-            .collect();
-        Ok(Assessment {
-            values: robot.parameters(),
-            mechanism: false,
-            robot: robot.clone(),
-            base,
-            torque_noise,
-            excitation: None,
-            warnings,
-        })
+        Ok(Self::alone(robot.clone(), base, robot.parameters(), false))
     }
 
     /// What a robot of either kind can tell at all.
@@ -192,25 +176,23 @@ impl Assessment {
             Plant::Serial(robot) => return Self::of_robot(robot),
             Plant::Parallel(mechanism) => mechanism,
         };
-        let base = plant.base()?;
         let robot = mechanism.actuator_robot();
+        Ok(Self::alone(robot, plant.base()?, plant.values(), true))
+    }
+
+    /// Without a trajectory.
+    fn alone(robot: Robot, base: BaseParameters, values: Vec<f64>, mechanism: bool) -> Self {
         let (torque_noise, more) = torque_noise(&robot);
-        let warnings = mechanism
-            .warnings
-            .iter()
-            .chain(&base.warnings)
-            .cloned()
-            .chain(more)
-            .collect();
-        Ok(Assessment {
-            values: plant.values(),
-            mechanism: true,
+        let known = robot.warnings.iter().chain(&base.warnings).cloned();
+        Assessment {
+            warnings: known.chain(more).collect(),
+            values,
+            mechanism,
             robot,
             base,
             torque_noise,
             excitation: None,
-            warnings,
-        })
+        }
     }
 
     /// What a robot of either kind will tell on this trajectory.
@@ -287,16 +269,7 @@ impl Assessment {
 /// One period at [`RATE`] (at least 20 samples), the end point left out.
 pub fn sample_period(fourier: &Fourier) -> Samples {
     let count = ((fourier.period * RATE).round() as usize).clamp(20, 1_000_000);
-    let sampled = fourier.sample(count);
-    let mut s = Samples::zeros(fourier.dof(), count);
-    for j in 0..fourier.dof() {
-        for i in 0..count {
-            s.q[j * count + i] = sampled.q[(j, i)];
-            s.qd[j * count + i] = sampled.qd[(j, i)];
-            s.qdd[j * count + i] = sampled.qdd[(j, i)];
-        }
-    }
-    s
+    fourier.motion(count)
 }
 
 /// Condition numbers, non-zero singular values and `ln det` of the weighted information matrix.

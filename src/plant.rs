@@ -228,31 +228,22 @@ impl Plant {
     /// As [`Plant::regressor`].
     pub fn known_torque(&self, x: &Samples) -> Result<Vec<f64>> {
         match self {
-            Plant::Serial(robot) => {
-                let mut tau = vec![0.0; x.dof * x.count];
-                for (j, joint) in robot.joints.iter().enumerate() {
-                    for term in JointTerm::ALL {
-                        let value = joint.terms[term as usize];
-                        if joint.identify[term as usize] || value == 0.0 {
-                            continue;
-                        }
-                        for s in 0..x.count {
-                            tau[j * x.count + s] += value * term_factor(term, x.at(j, s));
-                        }
-                    }
-                }
-                Ok(tau)
-            }
-            Plant::Parallel(mechanism) => {
-                let all = mechanism.nominal_torque(x)?;
-                let w = mechanism.regressor(x)?;
-                let phi = mechanism.parameters.values();
-                let phi = faer::ColRef::from_slice(&phi);
-                let unknown = &w * phi;
-                let rest = all.iter().enumerate().map(|(i, t)| t - unknown[i]);
-                Ok(rest.collect())
-            }
+            Plant::Serial(robot) => Ok(known_terms(robot, x)),
+            Plant::Parallel(_) => self.known(x, &self.regressor(x)?),
         }
+    }
+
+    /// [`Plant::known_torque`] where the regressor of the motion is at hand.
+    fn known(&self, x: &Samples, w: &Mat<f64>) -> Result<Vec<f64>> {
+        let mechanism = match self {
+            Plant::Serial(robot) => return Ok(known_terms(robot, x)),
+            Plant::Parallel(mechanism) => mechanism,
+        };
+        let all = mechanism.nominal_torque(x)?;
+        let phi = mechanism.parameters.values();
+        let unknown = w * faer::ColRef::from_slice(&phi);
+        let rest = all.iter().enumerate().map(|(i, t)| t - unknown[i]);
+        Ok(rest.collect())
     }
 
     /// Torque with other values of the unknowns: `W φ + τ_known`.
@@ -263,9 +254,9 @@ impl Plant {
     /// # Panics
     /// If there is not one number for each parameter.
     pub fn torque(&self, x: &Samples, phi: &[f64]) -> Result<Vec<f64>> {
-        let mut tau = self.known_torque(x)?;
         let w = self.regressor(x)?;
         assert_eq!(w.ncols(), phi.len(), "one number for each parameter");
+        let mut tau = self.known(x, &w)?;
         let unknown = &w * faer::ColRef::from_slice(phi);
         tau.iter_mut()
             .enumerate()
@@ -314,4 +305,21 @@ impl Plant {
             Plant::Parallel(mechanism) => mechanism.base(),
         }
     }
+}
+
+/// Torque of the terms of a tree's joints that are not identified.
+fn known_terms(robot: &Robot, x: &Samples) -> Vec<f64> {
+    let mut tau = vec![0.0; x.dof * x.count];
+    for (j, joint) in robot.joints.iter().enumerate() {
+        for term in JointTerm::ALL {
+            let value = joint.terms[term as usize];
+            if joint.identify[term as usize] || value == 0.0 {
+                continue;
+            }
+            for s in 0..x.count {
+                tau[j * x.count + s] += value * term_factor(term, x.at(j, s));
+            }
+        }
+    }
+    tau
 }

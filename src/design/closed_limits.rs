@@ -284,25 +284,30 @@ impl<'a> ClosedLimits<'a> {
         }
     }
 
+    /// Largest use of a band by the motion in the memory, and which.
+    fn bands_used(&self, memory: &PathMemory) -> (f64, usize) {
+        let mut most = (0.0, 0);
+        let mut values = Vec::new();
+        for (i, band) in self.bands.iter().enumerate() {
+            self.values(band, memory, &mut values);
+            for v in &values {
+                let used = (v - band.middle).abs() / band.half;
+                if used > most.0 {
+                    most = (used, i);
+                }
+            }
+        }
+        most
+    }
+
     /// Largest use, and of what.
     fn worst(&self, motion: &Samples, memory: &mut PathMemory) -> (f64, String) {
         if !self.evaluate(motion, memory) {
             let why = self.mechanism.motion(motion).err();
             return (f64::INFINITY, why.map_or(String::new(), |e| e.to_string()));
         }
-        let mut worst = (0.0, String::new());
-        let mut values = Vec::new();
-        let mut at = 0;
-        for (i, band) in self.bands.iter().enumerate() {
-            self.values(band, memory, &mut values);
-            for v in &values {
-                let used = (v - band.middle).abs() / band.half;
-                if used > worst.0 || used.is_nan() {
-                    worst.0 = used;
-                    at = i;
-                }
-            }
-        }
+        let (used, at) = self.bands_used(memory);
+        let mut worst = (used, String::new());
         if let Some(band) = self.bands.get(at) {
             const WHAT: [&str; 5] = ["position", "velocity", "acceleration", "jerk", "force"];
             let joint = &self.mechanism.robot.joints[self.mechanism.actuated[band.actuator]];
@@ -340,14 +345,7 @@ impl PathLimits for ClosedLimits<'_> {
         if !self.evaluate(motion, memory) {
             return f64::INFINITY;
         }
-        let mut most: f64 = 0.0;
-        let mut values = Vec::new();
-        for band in &self.bands {
-            self.values(band, memory, &mut values);
-            for v in &values {
-                most = most.max((v - band.middle).abs() / band.half);
-            }
-        }
+        let mut most = self.bands_used(memory).0;
         if most > 1.0 {
             return most;
         }

@@ -30,7 +30,6 @@ pub(super) fn assess(
     }
     let certificate = overall(&closed);
     let platform = platform(mechanism, motion, closed);
-    let poor = unexcited(&all, w.as_ref());
     all.excite(
         trajectory,
         actuators,
@@ -39,14 +38,15 @@ pub(super) fn assess(
         certificate,
         Some(platform),
     )?;
+    let poor = unexcited(&all);
     all.warnings.extend(poor);
     Ok(all)
 }
 
 /// A warning where the motion leaves base parameters out. Parameters of a parallel robot differ by
 /// many orders of magnitude in size, so unit columns decide.
-fn unexcited(a: &Assessment, w: faer::MatRef<'_, f64>) -> Option<Warning> {
-    let (condition, ..) = super::condition_numbers(&a.base, w, &a.torque_noise).ok()?;
+fn unexcited(a: &Assessment) -> Option<Warning> {
+    let condition = a.excitation.as_ref()?.condition;
     (condition.normalised > 1e6).then(|| {
         Warning::new(
             "trajectory",

@@ -21,6 +21,7 @@
 //! with the largest second difference of all samples, doubled, for `ü`: a bound that is **stated**,
 //! not proven; as is that of a mechanism without closed form, for all of it.
 
+use super::dynamics::slice;
 use super::geometry::Path;
 use super::interval::Interval;
 use super::margins::PoseKind;
@@ -236,26 +237,16 @@ pub fn closed_certificate(
         l.jerk *= derate;
         l.effort *= derate;
     }
-    let samples = sampled(mechanism, fourier)?;
+    let samples = fourier.motion(SAMPLES);
     let (reach, proven) = actuator_reach(mechanism, fourier, &actuators, &samples)?;
     let mut ws = ClosedWorkspace::default();
-    let (m, n) = (samples.dof, samples.count);
+    let n = samples.count;
     let na = mechanism.actuators();
     let (mut smooth, mut friction) = (vec![0.0; na * n], vec![0.0; na * n]);
+    let (mut part, mut force) = (Samples::default(), Vec::new());
     for (from, to) in mechanism.chunks(n) {
-        let mut part = Samples::zeros(m, to - from);
+        slice(&samples, from, to, &mut part);
         let count = part.count;
-        for k in 0..m {
-            for (to, source) in [
-                (&mut part.q, &samples.q),
-                (&mut part.qd, &samples.qd),
-                (&mut part.qdd, &samples.qdd),
-            ] {
-                to[k * count..(k + 1) * count]
-                    .copy_from_slice(&source[k * n + from..k * n + from + count]);
-            }
-        }
-        let mut force = Vec::new();
         mechanism.evaluate_motion(&mut ws, &part)?;
         mechanism.smooth_force(&mut ws, &mut force);
         for a in 0..na {
@@ -318,21 +309,6 @@ pub fn closed_certificate(
         proven,
         satisfied,
     })
-}
-
-/// The motion at [`SAMPLES`] instants of the period.
-fn sampled(mechanism: &Mechanism, fourier: &Fourier) -> Result<Samples> {
-    let s = fourier.sample(SAMPLES);
-    let m = mechanism.freedoms();
-    let all = |a: &nalgebra::DMatrix<f64>| a.transpose().as_slice().to_vec();
-    let samples = Samples {
-        dof: m,
-        count: SAMPLES,
-        q: all(&s.q),
-        qd: all(&s.qd),
-        qdd: all(&s.qdd),
-    };
-    Ok(samples)
 }
 
 /// What the actuators reach: proven where the kinematics has a closed form, else sampled with the

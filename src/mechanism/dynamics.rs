@@ -188,7 +188,7 @@ fn finite(a: &[f64]) -> bool {
 }
 
 /// Samples `from .. to` of a motion, into memory that is reused.
-fn slice(x: &Samples, from: usize, to: usize, part: &mut Samples) {
+pub(super) fn slice(x: &Samples, from: usize, to: usize, part: &mut Samples) {
     let n = to - from;
     part.dof = x.dof;
     part.count = n;

@@ -156,6 +156,19 @@ impl Fourier {
     pub fn sample(&self, samples: usize) -> Sampled {
         Table::new(self.period, &self.harmonics, samples).sample(self)
     }
+
+    /// [`Fourier::sample`] in the order that the kernels read: all samples of a coordinate together.
+    pub fn motion(&self, samples: usize) -> crate::dynamics::Samples {
+        let sampled = self.sample(samples);
+        let all = |a: &DMatrix<f64>| a.transpose().as_slice().to_vec();
+        crate::dynamics::Samples {
+            dof: self.dof(),
+            count: samples,
+            q: all(&sampled.q),
+            qd: all(&sampled.qd),
+            qdd: all(&sampled.qdd),
+        }
+    }
 }
 
 #[cfg(test)]

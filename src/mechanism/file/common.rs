@@ -6,7 +6,7 @@ use crate::mechanism::{Mechanism, Setup, Task};
 use crate::robot::file::joint::{JointEntry, joint_values, stated_limits};
 use crate::robot::file::names::{did_you_mean, listed};
 use crate::robot::file::{Text, file_stem};
-use crate::robot::{Joint, JointTerm, Limits, Motion, Prior};
+use crate::robot::{Joint, JointTerm, Motion, Prior};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use toml::Spanned;
@@ -192,18 +192,7 @@ impl Head<'_> {
         let mut all = Vec::new();
         for i in 1..=count {
             let name = format!("{prefix}{i}");
-            let mut joint = Joint {
-                name: name.clone(),
-                motion,
-                continuous: false,
-                limits: Limits::default(),
-                torque_noise: None,
-                position_resolution: None,
-                gear_ratio: None,
-                piston: None,
-                terms: [0.0; 4],
-                identify: [false; 4],
-            };
+            let mut joint = Joint::new(&name, motion);
             self.shared(
                 &mut joint,
                 &mut if i == 1 { warnings.clone() } else { vec![] },
