@@ -40,7 +40,11 @@ fn log(
 }
 
 fn read(path: &PathBuf) -> excite::Result<Record> {
-    Record::read(path, &Plant::load("planar2").unwrap(), Purpose::Fit, None)
+    read_periodic(path, None)
+}
+
+fn read_periodic(path: &PathBuf, period: Option<f64>) -> excite::Result<Record> {
+    Record::read(path, &Plant::load("planar2").unwrap(), Purpose::Fit, period)
 }
 
 fn says(record: &Record, words: &[&str]) {
@@ -116,6 +120,17 @@ fn time_stamps_are_repaired_and_said() {
     }))
     .unwrap();
     says(&r, &["milliseconds"]);
+}
+
+#[test]
+fn a_period_of_less_than_four_samples_is_none() {
+    let dir = folder();
+    let path = log("clean.csv", &dir, 1000, |_, _| {});
+    for period in [1e-9, 1e-4, 0.002, 0.0079] {
+        let r = read_periodic(&path, Some(period)).unwrap();
+        says(&r, &["shorter than 4 samples"]);
+        assert_eq!((r.period, r.len()), (None, 1000));
+    }
 }
 
 #[test]

@@ -278,7 +278,7 @@ fn the_answer_does_not_depend_on_the_number_of_threads() {
 /// Condition numbers (unit columns) for which the best of 25 random multisines is known: 6-UPS, 5
 /// harmonics, 10 s, ±0.1 m, ±0.25 rad.
 #[test]
-#[ignore = "takes minutes, and fails from 34 + 12 parameters on, see docs/limits.md"]
+#[ignore = "takes a minute and more"]
 fn conditions_are_well_below_those_of_random_multisines() {
     use excite::mechanism::gough_stewart::Bodies;
     let (model, _) = parallel::reference("sg");
@@ -326,6 +326,6 @@ fn conditions_are_well_below_those_of_random_multisines() {
             c.normalised,
             design.record.seconds
         );
-        assert!(c.normalised < 0.8 * best, "{what}: {}", c.normalised);
+        assert!(c.normalised < 0.6 * best, "{what}: {}", c.normalised);
     }
 }

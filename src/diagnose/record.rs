@@ -104,7 +104,7 @@ impl Record {
             found
         });
         let (dt, count, cycle) = match period {
-            Some(period) if span + 1.5 * mean >= 1.0 * period => {
+            Some(period) if span + 1.5 * mean >= period && period >= 4.0 * mean => {
                 let whole = ((span + 1.5 * mean) / period).floor().max(1.0) as usize;
                 let mut per = (period / mean).round() as usize;
                 // far above the band nothing is learnt from more samples

@@ -13,6 +13,9 @@ const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 /// Groups of one column an actuator.
 const GROUPS: [&str; 8] = ["tau", "ddq", "dq", "qref", "ql", "q", "pa", "pb"];
 
+/// Shortest period of a motion, in samples.
+const SHORTEST: f64 = 4.0;
+
 /// Group and number of a column name: `tau3` is `("tau", 3)`.
 fn numbered(name: &str) -> Option<(&'static str, usize)> {
     let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
@@ -170,6 +173,7 @@ impl Record {
 
         record.fill_dropped(&clock)?;
         record.check_channels(&joints)?;
+        record.drop_short_period(clock.step);
         record.resample(&clock);
         record.check_period();
         Ok(record)
@@ -310,11 +314,26 @@ impl Record {
         Ok(())
     }
 
+    /// A stated period that samples cannot resolve is none.
+    fn drop_short_period(&mut self, step: f64) {
+        let Some(period) = self.period.filter(|p| *p < SHORTEST * step) else {
+            return;
+        };
+        self.warnings.push(Warning::new(
+            self.path.display().to_string(),
+            format!(
+                "the stated period of {period} s is shorter than {SHORTEST} samples ({step:.6} s each): it is \
+                 treated as not periodic; period is in seconds"
+            ),
+        ));
+        self.period = None;
+    }
+
     /// Puts all channels on an even grid; with a period, on one that divides it.
     fn resample(&mut self, clock: &Clock) {
         let (first, last) = (clock.t[0], clock.t[clock.t.len() - 1]);
         let mut step = clock.step;
-        if let Some(period) = self.period.filter(|p| *p > 2.0 * step) {
+        if let Some(period) = self.period {
             step = period / (period / step).round();
         }
         // time stamps that jitter may miss the last point of the grid by some of a step
