@@ -15,6 +15,13 @@ use rayon::prelude::*;
 /// Sub-steps of a sampling interval over which what is not smooth is averaged.
 pub const FINE: usize = 4;
 
+/// Widths over which dry friction may change its sign, shares of the largest speed.
+const ROUNDED: [f64; 3] = [2e-3, 4e-3, 8e-3];
+/// Share of the dry friction by which a model may be off close to a reversal.
+const BENT: f64 = 0.1;
+/// How long that lasts to either side, s.
+const NEAR: f64 = 0.012;
+
 /// A column of a linear model: values on the rows of some actuators, all records one after another
 /// (the fitted ones first).
 #[derive(Debug, Clone, Default)]
@@ -62,6 +69,8 @@ pub struct Data<'a> {
     pub tau: Vec<Vec<f64>>,
     /// noise by actuator
     pub noise: Vec<Noise>,
+    /// weight of every row by actuator, 1 away from reversals
+    pub weights: Vec<Vec<f64>>,
     /// inertia that an actuator accelerates, about the middle of the motion, kg m² or kg
     pub inertia: Vec<f64>,
     /// variance of the window over which the torque channel averages, beyond plus and minus one
@@ -169,6 +178,7 @@ impl<'a> Data<'a> {
             known,
             tau,
             noise: Vec::new(),
+            weights: vec![vec![1.0; rows]; n],
             inertia: inertia(plant, &records[0])?,
             records,
             window: 0.0,
@@ -229,13 +239,47 @@ impl<'a> Data<'a> {
         out
     }
 
-    /// A signal of all records, whitened as actuator `j` is.
+    /// A signal of all records, whitened and weighted as actuator `j` is.
     pub fn whiten(&self, j: usize, x: &[f64]) -> Vec<f64> {
         let mut out = Vec::with_capacity(x.len());
         for k in 0..self.records.len() {
             self.noise[j].whiten(&x[self.span(k)], &mut out);
         }
+        out.iter_mut()
+            .zip(&self.weights[j])
+            .for_each(|(x, w)| *x *= w);
         out
+    }
+
+    /// A whitened and weighted signal of all records as it was before, in units of the noise.
+    pub fn unwhiten(&self, j: usize, x: &[f64]) -> Vec<f64> {
+        let plain: Vec<f64> = x.iter().zip(&self.weights[j]).map(|(x, w)| x / w).collect();
+        let mut out = Vec::with_capacity(x.len());
+        for k in 0..self.records.len() {
+            self.noise[j].unwhiten(&plain[self.span(k)], &mut out);
+        }
+        out
+    }
+
+    /// Weights `1/√(1 + (κ F_c/σ)² b)` of the rows of an actuator: where its velocity changes sign
+    /// (`b = 1` within [`NEAR`], 0 from twice that on), friction bends the motion faster than the
+    /// positions show, and the model is off by a share `κ` of the friction.
+    fn doubt(&self, j: usize, coulomb: f64) -> Vec<f64> {
+        let doubt = (BENT * coulomb / self.noise[j].std.max(1e-300)).powi(2);
+        self.each(|r, _| {
+            let v = r.state(j).1;
+            let mut away = vec![f64::INFINITY; v.len()];
+            let crossed = |i: usize| i + 1 < v.len() && v[i] * v[i + 1] <= 0.0;
+            for i in (0..v.len()).filter(|i| crossed(*i)) {
+                let reach = (2.0 * NEAR / r.dt) as usize + 1;
+                for k in i.saturating_sub(reach)..(i + reach + 2).min(v.len()) {
+                    let distance = (k as f64 - i as f64 - 0.5).abs() * r.dt;
+                    away[k] = away[k].min(distance);
+                }
+            }
+            let b = away.iter().map(|d| (2.0 - d / NEAR).clamp(0.0, 1.0));
+            b.map(|b| 1.0 / (1.0 + doubt * b).sqrt()).collect()
+        })
     }
 
     /// A modelled signal of all records as the torque channel would show it, whitened.
@@ -453,7 +497,8 @@ impl<'a> Data<'a> {
     }
 
     /// What a log of any robot may have without being at odds with its model: reversals of friction
-    /// that are not perfectly sharp.
+    /// that are not perfectly sharp, and a motion close to them that friction bends faster than
+    /// positions show.
     pub fn ordinary(&mut self) {
         let n = self.joints();
         if self.plant.mechanism().is_some() {
@@ -465,9 +510,13 @@ impl<'a> Data<'a> {
             if coulomb == 0.0 {
                 continue;
             }
-            let (sharp, wide) = (1e-3 * self.speed[j], 8e-3 * self.speed[j]);
-            let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
-            self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
+            self.weights[j] = self.doubt(j, coulomb);
+            let sharp = 1e-3 * self.speed[j];
+            // tanh of three widths: any rounding in between is close to a sum of them
+            for wide in ROUNDED.map(|w| w * self.speed[j]) {
+                let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
+                self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
+            }
         }
     }
 

@@ -390,13 +390,7 @@ impl<'a> Evidence<'a> {
         residual
             .par_iter()
             .enumerate()
-            .map(|(j, e)| {
-                let mut out = Vec::with_capacity(e.len());
-                for k in 0..self.data.records.len() {
-                    self.data.noise[j].unwhiten(&e[self.data.span(k)], &mut out);
-                }
-                out
-            })
+            .map(|(j, e)| self.data.unwhiten(j, e))
             .collect()
     }
 

@@ -270,6 +270,7 @@ pub fn prepare<'a>(plant: &'a Plant, raws: &[Raw]) -> Result<Data<'a>> {
         .map(|r| Record::prepare(plant, r, &likely))
         .collect::<Result<Vec<_>>>()?;
     let mut data = Data::new(plant, records)?;
+    data.ordinary();
     // the width of the window of the torque channel, then what the encoders cannot resolve
     for pass in 0..2 {
         let e = Evidence::new(&data, 1.0);
@@ -290,7 +291,6 @@ pub fn prepare<'a>(plant: &'a Plant, raws: &[Raw]) -> Result<Data<'a>> {
             data.limit_excess(&residual);
         }
     }
-    data.ordinary();
     Ok(data)
 }
 

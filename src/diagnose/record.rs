@@ -3,7 +3,8 @@
 //!
 //! Where the motion repeats, position, velocity and acceleration are one Fourier series over all
 //! periods, `q(t) = Σ_h c_h e^{i h ω t}`, each line weighted by `max(0, 1 − σ²/|c_h|²)` (Wiener)
-//! with the noise `σ²` of the scatter between periods. Differentiation is exact and needs no
+//! with the noise `σ²` of the scatter between periods, or of the encoder's steps where a motion that
+//! repeats exactly hides them in every period alike. Differentiation is exact and needs no
 //! filter; what the encoder cannot resolve is left out and counted as noise of the torque (see
 //! [`noise`](super::noise)). Otherwise the positions pass a zero-phase low-pass and central
 //! differences.
@@ -151,9 +152,21 @@ impl Record {
             }
         }
         let tau = grid(&raw.tau, stamped);
+        let steps: Vec<f64> = plant
+            .actuators()
+            .iter()
+            .zip(&raw.q)
+            .map(|(joint, q)| {
+                joint
+                    .position_resolution
+                    .unwrap_or_else(|| lattice(q))
+                    .powi(2)
+                    / 12.0
+            })
+            .collect();
         let (motion, position_noise, band) = match cycle {
-            Some(cycle) => periodic(&q, n, count, cycle, dt),
-            None => smooth(&q, n, count, dt),
+            Some(cycle) => periodic(&q, &steps, count, cycle, dt),
+            None => smooth(&q, &steps, count, dt),
         };
         let (x, actuators) = match plant.mechanism() {
             None => (motion.clone(), motion),
@@ -288,8 +301,27 @@ fn third_difference(x: &[f64], n: usize, count: usize) -> f64 {
         .sum()
 }
 
-/// Fourier series of the mean period, with its derivatives, over the whole record.
-fn periodic(q: &[f64], n: usize, count: usize, cycle: usize, dt: f64) -> (Samples, Vec<f64>, f64) {
+/// Step of a channel whose values are whole multiples of it; 0 where they are not.
+fn lattice(x: &[f64]) -> f64 {
+    let moves = || x.windows(2).map(|w| (w[1] - w[0]).abs());
+    let step = moves().filter(|d| *d > 1e-12).fold(f64::INFINITY, f64::min);
+    let off = |d: f64| (d / step - (d / step).round()).abs();
+    match step.is_finite() && moves().all(|d| off(d) < 0.1) {
+        true => step,
+        false => 0.0,
+    }
+}
+
+/// Fourier series of the mean period, with its derivatives, over the whole record. `steps` are
+/// the variances of the encoders' steps by actuator.
+fn periodic(
+    q: &[f64],
+    steps: &[f64],
+    count: usize,
+    cycle: usize,
+    dt: f64,
+) -> (Samples, Vec<f64>, f64) {
+    let n = steps.len();
     let periods = count / cycle;
     let period = cycle as f64 * dt;
     let omega = 2.0 * PI / period;
@@ -308,8 +340,10 @@ fn periodic(q: &[f64], n: usize, count: usize, cycle: usize, dt: f64) -> (Sample
         let mut one = [vec![0.0; cycle], vec![0.0; cycle], vec![0.0; cycle]];
         let centre = mean.iter().sum::<f64>() / cycle as f64;
         one[0].fill(centre);
-        // variance of a complex line of the mean period
-        let floor = variance[j] / count as f64;
+        // variance of a complex line of the mean period; the part of the steps that does not scatter
+        // is the same in every period
+        let hidden = (steps[j] - variance[j]).max(0.0);
+        let floor = variance[j] / count as f64 + hidden / cycle as f64;
         for h in 1..=lines {
             let (mut re, mut im) = (0.0, 0.0);
             for (i, x) in mean.iter().enumerate() {
@@ -345,12 +379,17 @@ fn periodic(q: &[f64], n: usize, count: usize, cycle: usize, dt: f64) -> (Sample
             }
         }
     }
-    let noise = variance.iter().map(|v| v.sqrt()).collect();
+    let noise = variance
+        .iter()
+        .zip(steps)
+        .map(|(v, s)| v.max(*s).sqrt())
+        .collect();
     (out, noise, band)
 }
 
 /// Low-passed positions and their central differences.
-fn smooth(q: &[f64], n: usize, count: usize, dt: f64) -> (Samples, Vec<f64>, f64) {
+fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> (Samples, Vec<f64>, f64) {
+    let n = steps.len();
     let mut out = Samples::zeros(n, count);
     let mut noise = Vec::new();
     // half-width of a triangle applied twice: about 12 Hz
@@ -372,7 +411,7 @@ fn smooth(q: &[f64], n: usize, count: usize, dt: f64) -> (Samples, Vec<f64>, f64
             .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))
             .sum::<f64>()
             / (20.0 * row.len() as f64);
-        noise.push(rough.sqrt());
+        noise.push(rough.max(steps[j]).sqrt());
         out.q[j * count..(j + 1) * count].copy_from_slice(&clean);
         out.qd[j * count..(j + 1) * count].copy_from_slice(&velocity);
         out.qdd[j * count..(j + 1) * count].copy_from_slice(&acceleration);

@@ -22,9 +22,10 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Parameters that were fitted: coefficients and shape constants.
+    /// Parameters that were fitted: coefficients of columns that are not zero, and shape constants.
     pub fn freedoms(&self) -> usize {
-        self.eta.len() + self.shape.len()
+        let live = (0..self.eta.len()).filter(|&k| self.projected.raw[(k, k)] > 0.0);
+        live.count() + self.shape.len()
     }
 
     /// Whether it is the same effect at the same place.

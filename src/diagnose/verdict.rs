@@ -39,6 +39,8 @@ pub struct Member {
     pub candidate: Candidate,
     /// 0 to 1
     pub confidence: f64,
+    /// the same of the member or one of its rivals, 0 to 1
+    pub together: f64,
     /// share of the gap on fitted records
     pub explains: f64,
     /// interval of it
@@ -98,6 +100,8 @@ const SOUND: f64 = 0.5;
 const FLOOR: f64 = 0.25;
 /// Imperfection of a sound model, per row, that counts neither for nor against an effect.
 const SLACK: f64 = 0.05;
+/// Share of the whole gap, on fitted and on holdout records, that an effect must explain.
+const LEAST_SHARE: f64 = 0.03;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
 
@@ -176,6 +180,38 @@ impl State<'_> {
                 set[i] = b;
             }
         }
+    }
+
+    /// The set with one more effect, if that explains enough more. The first of several tries is
+    /// also compared with the best of all pairs.
+    fn grown(
+        &self,
+        list: &[Candidate],
+        set: &[Candidate],
+        candidate: Candidate,
+        first: bool,
+        total: f64,
+    ) -> Option<Vec<Candidate>> {
+        let mut grown = set.to_vec();
+        grown.push(candidate);
+        if !first && !accepted(self, set, &grown, total) {
+            return None;
+        }
+        if first
+            && grown.len() == 2
+            && let Some(mut pair) = best_pair(self, list)
+        {
+            let gain = |s: &[Candidate]| self.fit(s).0.gain;
+            self.polish(&mut pair);
+            let each = |i: usize| accepted(self, &others(&pair, i), &pair, total);
+            if gain(&pair) > gain(&grown) + 0.01 * total && (0..2).all(each) {
+                grown = pair;
+            }
+        }
+        if grown.len() > 1 {
+            self.polish(&mut grown);
+        }
+        accepted(self, set, &grown, total).then_some(grown)
     }
 
     /// Rivals of a place in the set with their best shapes, by falling gain beside the others.
@@ -300,29 +336,15 @@ pub fn decide(
         let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
         let mut next = st.challengers(list, &beside, 10);
         next.retain(|c| !set.iter().any(|s| s.same(c)));
-        let Some(best) = next.first().cloned() else {
-            break;
-        };
-        let mut grown = set.clone();
-        grown.push(best);
-        // the best of all pairs may be another one
-        if grown.len() == 2
-            && let Some(pair) = best_pair(&st, list)
-        {
-            let gain = |s: &[Candidate]| st.fit(s).0.gain;
-            let mut pair = pair;
-            st.polish(&mut pair);
-            if gain(&pair) > gain(&grown) + 0.01 * total {
-                grown = pair;
-            }
+        // one that gains most need not be one that holds: the others have their turn
+        let tried = next.into_iter().take(5).enumerate();
+        let grown = tried
+            .filter_map(|(i, candidate)| st.grown(list, &set, candidate, i == 0, total))
+            .next();
+        match grown {
+            Some(grown) => set = grown,
+            None => break,
         }
-        if grown.len() > 1 {
-            st.polish(&mut grown);
-        }
-        if !accepted(&st, &set, &grown, total) {
-            break;
-        }
-        set = grown;
     }
     // a rival that does better beside the others takes the place
     for _ in 0..2 {
@@ -336,8 +358,12 @@ pub fn decide(
                 && !rest.iter().any(|c| c.same(&b))
                 && st.merit(&b) > 1.01 * gained(&st, &set, i)
             {
-                set[i] = b;
-                changed = true;
+                let mut other = set.clone();
+                other[i] = b;
+                if accepted(&st, &rest, &other, total) {
+                    set = other;
+                    changed = true;
+                }
             }
         }
         if !changed || set.len() < 2 {
@@ -372,7 +398,8 @@ pub fn decide(
         false => [total, st.above(&hold_before, false)],
     };
     let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
-    let claims = members.iter().filter(|m| m.confidence >= 0.5).count();
+    // a set that cannot be told apart explains as well as its one right member
+    let claims = members.iter().filter(|m| m.together >= 0.5).count();
     let gap_left = after.iter().any(|v| *v > SOUND * rows);
     let verdict = match (visible || surprising, claims) {
         (false, 0) => Verdict::NoGap,
@@ -577,10 +604,6 @@ fn judge(
         true => (chi(&r0) - chi(&r1)) / held as f64 / (chi_gain / rows).max(1e-9),
         false => 1.0,
     };
-    let confidence = size
-        * logistic((share - 0.55) / 0.07).max(alone)
-        * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07))
-        / (1.0 + against);
     let quad = |m: &faer::Mat<f64>| -> f64 {
         let e = &c.eta;
         (0..e.len())
@@ -606,9 +629,19 @@ fn judge(
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
     let spread = 2.0 * gain.max(0.0).sqrt() / total.max(1.0);
+    // what explains next to nothing of the whole, or nothing where it was not fitted, is no finding
+    let matters = match frozen {
+        true => 1.0,
+        false => logistic((explains.min(holdout) - LEAST_SHARE) / 0.005),
+    };
+    let together = size
+        * matters
+        * logistic((share - 0.55) / 0.07).max(alone)
+        * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07));
     Member {
         candidate: c.clone(),
-        confidence,
+        confidence: together / (1.0 + against),
+        together,
         explains: explains.clamp(0.0, 1.0),
         interval: [
             (explains - spread).clamp(0.0, 1.0),

@@ -1,4 +1,5 @@
-//! The base tilts in proportion to the moment that the robot exerts on it.
+//! The base tilts on springs under the moment that the robot exerts on it: `M δ̈ + D δ̇ + K δ = −τ_base`
+//! about each axis, with the inertia `M` of the robot about the base.
 
 use super::*;
 
@@ -10,7 +11,7 @@ impl Effect for BaseCompliance {
         Card {
             name: "base_compliance",
             title: "base compliance",
-            equation: "tilt κ M_base, with its gravity and inertia",
+            equation: "tilt of M δ̈ + D δ̇ + K δ = −M_base, with its gravity and inertia",
             source: "Klimchik, Caro & Pashkevich 2013",
             aliases: &[],
             separated_by: "the same pose with another moment on the base",
@@ -24,14 +25,25 @@ impl Effect for BaseCompliance {
         }
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let Some(moment) = base_moment(cx) else {
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        // natural frequency of the robot on its base, damping ratio
+        [4.0, 6.0, 9.0, 13.0, 20.0, 40.0]
+            .map(|f| vec![f, 0.05])
+            .to_vec()
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k == 0
+    }
+
+    fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+        let Some(load) = cx.base() else {
             return Vec::new();
         };
         tilted(cx, |r, k, axis| {
             let span = cx.data.span(k);
-            let yields: Vec<f64> = moment[axis][span].iter().map(|m| -m).collect();
-            cx.derivatives(r, &yields)
+            let (moment, mass) = (&load.moment[axis][span.clone()], &load.mass[axis][span]);
+            backlash::fall(moment, mass, r.dt, 0.0, shape[0], shape[1], 0.0, r.cycle)
         })
     }
 
@@ -42,15 +54,33 @@ impl Effect for BaseCompliance {
 
     fn values(
         &self,
-        _cx: &Context,
+        cx: &Context,
         _place: &[usize],
-        _shape: &[f64],
+        shape: &[f64],
         eta: &[f64],
         std: &[f64],
     ) -> Vec<Value> {
+        let omega = 2.0 * std::f64::consts::PI * shape[0];
+        let soft = |axis: usize| {
+            let mass = cx.base().map_or(1.0, |b| {
+                b.mass[axis].iter().sum::<f64>() / b.mass[axis].len() as f64
+            });
+            1.0 / (mass * omega * omega)
+        };
         vec![
-            value("compliance_x", eta[0], std[0], "rad/(N m)"),
-            value("compliance_y", eta[1], std[1], "rad/(N m)"),
+            value(
+                "compliance_x",
+                eta[0] * soft(0),
+                std[0] * soft(0),
+                "rad/(N m)",
+            ),
+            value(
+                "compliance_y",
+                eta[1] * soft(1),
+                std[1] * soft(1),
+                "rad/(N m)",
+            ),
+            constant("natural_frequency", shape[0], "Hz"),
         ]
     }
 }
@@ -105,24 +135,48 @@ fn bodies(cx: &Context) -> Vec<f64> {
     phi
 }
 
-/// Moment about the base axes x and y that the base exerts on the robot, over all records.
-fn base_moment(cx: &Context) -> Option<[Vec<f64>; 2]> {
-    let Plant::Serial(robot) = cx.data.plant else {
-        return None;
-    };
-    let tree = crate::dynamics::Tree::new(&on_joints(robot));
-    let phi = bodies(cx);
-    let mut out = [Vec::new(), Vec::new()];
-    for r in &cx.data.records {
-        let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
-        let x = extended(r, [&still, &still]);
-        let mut tau = vec![0.0; x.dof * x.count];
-        tree.inverse_dynamics(&mut Default::default(), &phi, &x, &mut tau);
-        for (k, out) in out.iter_mut().enumerate() {
-            out.extend_from_slice(&tau[k * r.count..(k + 1) * r.count]);
+/// What the robot exerts on its base, over all records, for the axes x and y.
+pub struct Load {
+    /// moment that the base exerts on the robot, N m
+    pub moment: [Vec<f64>; 2],
+    /// inertia of the robot about the axis, kg m²
+    pub mass: [Vec<f64>; 2],
+}
+
+impl Load {
+    /// Of the nominal model; `None` for robots that are not serial.
+    pub fn of(cx: &Context) -> Option<Self> {
+        let Plant::Serial(robot) = cx.data.plant else {
+            return None;
+        };
+        let tree = crate::dynamics::Tree::new(&on_joints(robot));
+        let phi = bodies(cx);
+        let mut out = Load {
+            moment: Default::default(),
+            mass: Default::default(),
+        };
+        for r in &cx.data.records {
+            let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
+            let mut turning = still.clone();
+            turning[2].fill(1.0);
+            let mut work = Default::default();
+            let mut torque = |tilts: [&[Vec<f64>; 3]; 2]| -> Vec<f64> {
+                let x = extended(r, tilts);
+                let mut tau = vec![0.0; x.dof * x.count];
+                tree.inverse_dynamics(&mut work, &phi, &x, &mut tau);
+                tau
+            };
+            let rest = torque([&still, &still]);
+            let more = [torque([&turning, &still]), torque([&still, &turning])];
+            for (k, more) in more.iter().enumerate() {
+                let row = k * r.count..(k + 1) * r.count;
+                out.moment[k].extend_from_slice(&rest[row.clone()]);
+                let pairs = more[row.clone()].iter().zip(&rest[row]);
+                out.mass[k].extend(pairs.map(|(a, b)| a - b));
+            }
         }
+        Some(out)
     }
-    Some(out)
 }
 
 /// Columns for tilts of the base about x and about y; `motion` gives angle, rate and acceleration

@@ -29,30 +29,70 @@ impl Effect for LinkInertia {
             .collect()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+        // all ten parameters in proportion, a point mass, or all ten
+        vec![vec![1.0], vec![4.0], vec![10.0]]
+    }
+
+    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
         let robot = cx.data.plant.robot();
         let body = robot.bodies.iter().position(|b| b.coordinate == place[0]);
-        body.map_or_else(Vec::new, |b| body_columns(cx, b, 10))
+        body.map_or_else(Vec::new, |b| match shape[0] as usize {
+            1 => in_proportion(cx, b).into_iter().collect(),
+            count => body_columns(cx, b, count),
+        })
     }
 
     fn values(
         &self,
-        _cx: &Context,
-        _place: &[usize],
-        _shape: &[f64],
+        cx: &Context,
+        place: &[usize],
+        shape: &[f64],
         eta: &[f64],
         std: &[f64],
     ) -> Vec<Value> {
         let names = [
             "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
         ];
-        (0..10)
-            .map(|k| value(names[k], eta[k], std[k], crate::robot::inertia::UNITS[k]))
+        let unit = |k: usize| crate::robot::inertia::UNITS[k];
+        if shape[0] == 1.0 {
+            let robot = cx.data.plant.robot();
+            let body = robot.bodies.iter().find(|b| b.coordinate == place[0]);
+            let m = body.map_or(0.0, |b| b.inertia.mass());
+            return vec![
+                value("m", eta[0] * m, std[0] * m.abs(), unit(0)),
+                value("share_of_nominal", eta[0], std[0], ""),
+            ];
+        }
+        (0..eta.len())
+            .map(|k| value(names[k], eta[k], std[k], unit(k)))
             .collect()
     }
 }
 
-/// The first columns of the regressor of one body.
+/// What a body adds when all its parameters grow in proportion.
+fn in_proportion(cx: &Context, body: usize) -> Option<Column> {
+    let inertia = cx.data.plant.robot().bodies[body].inertia.0;
+    let parts = body_columns(cx, body, 10);
+    let mut rows = vec![vec![0.0; cx.data.rows()]; cx.data.joints()];
+    for (part, scale) in parts.iter().zip(inertia) {
+        for (j, values) in &part.rows {
+            rows[*j]
+                .iter_mut()
+                .zip(values)
+                .for_each(|(r, v)| *r += scale * v);
+        }
+    }
+    let column = prune(
+        Column {
+            rows: rows.into_iter().enumerate().collect(),
+        },
+        0,
+    );
+    (!column.rows.is_empty()).then_some(column)
+}
+
+/// The first columns of the regressor of one body; a parameter that never acts has a column of zeros.
 pub(crate) fn body_columns(cx: &Context, body: usize, count: usize) -> Vec<Column> {
     (0..count)
         .filter_map(|k| {
@@ -61,7 +101,11 @@ pub(crate) fn body_columns(cx: &Context, body: usize, count: usize) -> Vec<Colum
             let rows = (0..cx.data.joints())
                 .map(|j| (j, cx.data.w[j].col(c).iter().copied().collect()))
                 .collect();
-            Some(prune(Column { rows }, 0))
+            let live = prune(Column { rows }, 0);
+            Some(match live.rows.is_empty() {
+                true => Column::on(0, vec![0.0; cx.data.rows()]),
+                false => live,
+            })
         })
         .collect()
 }

@@ -39,6 +39,7 @@ use super::record::Record;
 use crate::dynamics::Samples;
 use crate::plant::{Kind, Plant};
 use crate::robot::{JointTerm, Motion};
+use std::sync::OnceLock;
 
 /// What is known about an effect, for reports and documentation.
 #[derive(Debug, Clone, Copy)]
@@ -84,6 +85,8 @@ pub struct Context<'a> {
     pub peak: Vec<f64>,
     /// column `j` of the mass matrix over all records: `mass[j][i]` is `M_ij` (serial robots)
     pub mass: Vec<Vec<Vec<f64>>>,
+    /// what the robot exerts on its base, once it was asked for
+    base: OnceLock<Option<base_compliance::Load>>,
 }
 
 /// An effect of the catalogue.
@@ -187,7 +190,15 @@ impl<'a> Context<'a> {
             rigid,
             peak,
             mass,
+            base: OnceLock::new(),
         })
+    }
+
+    /// What the robot exerts on its base (serial robots).
+    pub(crate) fn base(&self) -> Option<&base_compliance::Load> {
+        self.base
+            .get_or_init(|| base_compliance::Load::of(self))
+            .as_ref()
     }
 
     /// Every actuator by itself.
