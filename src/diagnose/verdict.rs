@@ -100,10 +100,13 @@ const SOUND: f64 = 0.5;
 const FLOOR: f64 = 0.25;
 /// Imperfection of a sound model, per row, that counts neither for nor against an effect.
 const SLACK: f64 = 0.05;
-/// Share of the whole gap, on fitted and on holdout records, that an effect must explain.
-const LEAST_SHARE: f64 = 0.03;
+/// Share of the gap on its joints, on fitted and on holdout records, that an effect must explain.
+const LEAST_SHARE: f64 = 0.05;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
+
+/// Price of a freedom that is fitted to the few parameters that a prior finds unlikely (Akaike).
+const PRICE: f64 = 2.0;
 
 struct State<'a> {
     evidence: &'a Evidence<'a>,
@@ -152,6 +155,11 @@ impl State<'_> {
         self.evidence.j0 - fit.gain - chi
     }
 
+    /// Whether an effect may show in the parameters that the nominal model would need.
+    fn hides(&self, c: &Candidate) -> bool {
+        self.effects[c.effect].hides()
+    }
+
     /// Joints on whose rows an effect acts most.
     fn joints_of(&self, c: &Candidate) -> Vec<usize> {
         if c.place.is_empty() {
@@ -194,7 +202,7 @@ impl State<'_> {
     ) -> Option<Vec<Candidate>> {
         let mut grown = set.to_vec();
         grown.push(candidate);
-        if !first && !accepted(self, set, &grown, total) {
+        if !first && !accepted(self, &grown, set.len()) {
             return None;
         }
         if first
@@ -203,15 +211,15 @@ impl State<'_> {
         {
             let gain = |s: &[Candidate]| self.fit(s).0.gain;
             self.polish(&mut pair);
-            let each = |i: usize| accepted(self, &others(&pair, i), &pair, total);
+            let each = |i: usize| accepted(self, &pair, i);
             if gain(&pair) > gain(&grown) + 0.01 * total && (0..2).all(each) {
-                grown = pair;
+                return Some(pair);
             }
         }
         if grown.len() > 1 {
             self.polish(&mut grown);
         }
-        accepted(self, set, &grown, total).then_some(grown)
+        accepted(self, &grown, set.len()).then_some(grown)
     }
 
     /// Rivals of a place in the set with their best shapes, by falling gain beside the others.
@@ -265,10 +273,18 @@ impl State<'_> {
 
     /// Gain less what its freedoms cost, a little more for effects that are always expected.
     fn merit(&self, c: &Candidate) -> f64 {
+        self.merit_of(c, c.gain, self.price())
+    }
+
+    /// Price of a freedom that is fitted to rows: that of the Bayesian information criterion.
+    fn price(&self) -> f64 {
+        ((self.evidence.data.fitted * self.evidence.data.joints()) as f64).ln()
+    }
+
+    fn merit_of(&self, c: &Candidate, gain: f64, price: f64) -> f64 {
         let name = self.effects[c.effect].card().name;
-        let n = (self.evidence.data.fitted * self.evidence.data.joints()) as f64;
-        let cost = c.freedoms() as f64 * n.ln();
-        (c.gain - cost) * (1.0 + 0.01 * familiarity(name) - 0.003 * c.freedoms() as f64)
+        let freedoms = c.freedoms() as f64;
+        (gain - price * freedoms) * (1.0 + 0.01 * familiarity(name) - 0.003 * freedoms)
     }
 }
 
@@ -360,7 +376,7 @@ pub fn decide(
             {
                 let mut other = set.clone();
                 other[i] = b;
-                if accepted(&st, &rest, &other, total) {
+                if accepted(&st, &other, i) {
                     set = other;
                     changed = true;
                 }
@@ -440,12 +456,12 @@ fn inflation(residual: &[Vec<f64>], fitted: usize) -> f64 {
     (power / n).max(1.0).sqrt() * (1.0 + rho / power.max(1e-300)).max(1.0).sqrt()
 }
 
-/// Whether a grown set explains enough more than the one before, also on holdout records.
-fn accepted(st: &State, set: &[Candidate], grown: &[Candidate], total: f64) -> bool {
+/// Whether member `i` of a set explains enough beside the others, also on holdout records.
+fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let data = st.evidence.data;
     let rows = data.fitted as f64;
-    let (f0, r0) = st.fit(set);
-    let (f1, r1) = st.fit(grown);
+    let (f0, r0) = st.fit(&others(set, i));
+    let (f1, r1) = st.fit(set);
     let chi = |r: &[Vec<f64>], fit: bool| -> f64 {
         r.iter()
             .map(|e| {
@@ -462,12 +478,17 @@ fn accepted(st: &State, set: &[Candidate], grown: &[Candidate], total: f64) -> b
     let prior = (f1.gain - f0.gain) - visible;
     let held = data.rows() - data.fitted;
     let hold = chi(&r0, false) - chi(&r1, false);
-    let significant = visible > LEAST * rows && visible > 0.02 * total;
+    let gap = st.gap(&r0, true);
+    let there: f64 = st.joints_of(&set[i]).iter().map(|j| gap[*j].max(0.0)).sum();
+    let significant = visible > LEAST * rows && visible > 0.02 * there;
     let generalises = held == 0 || hold > 0.25 * visible * held as f64 / rows;
     if significant && generalises {
         return true;
     }
-    prior > SURPRISE && prior > 0.5 * visible.abs() && (held == 0 || hold > -0.02 * held as f64)
+    st.hides(&set[i])
+        && prior > SURPRISE
+        && prior > 0.5 * visible.abs()
+        && (held == 0 || hold > -0.02 * held as f64)
 }
 
 /// The two candidates that explain most together.
@@ -521,9 +542,10 @@ fn judge(
     // of what is there without it on its joints; the least that counts is taken off
     let slack = SLACK * rows * joints.len() as f64;
     let visible = ((w - a) / (w - slack).max(w * 0.3).max(1e-9)).min(1.0);
-    let prior = (surprise_without - surprise_after) / (surprise_without - free).max(1.0);
-    let chi_gain = gain - (surprise_without - surprise_after);
-    let frozen = chi_gain < 0.5 * gain && surprise_without - surprise_after > SURPRISE;
+    let fall = surprise_without - surprise_after;
+    let prior = fall / (surprise_without - free).max(1.0);
+    let chi_gain = gain - fall;
+    let frozen = st.hides(c) && chi_gain < 0.5 * gain && fall > SURPRISE;
     let share = if frozen { prior } else { visible };
     let held = data.rows() - data.fitted;
     let (hw, ha) = (sum(&st.gap(&r0, false)), sum(&st.gap(&r1, false)));
@@ -544,14 +566,31 @@ fn judge(
     };
     // rivals in its place
     let beside: Vec<&Projected> = rest.iter().map(|c| &c.projected).collect();
-    let own = st.merit(&Candidate { gain, ..c.clone() });
+    let own = match frozen {
+        true => st.merit_of(c, fall, PRICE),
+        false => st.merit_of(c, gain, st.price()),
+    };
     let mut rivals: Vec<Rival> = Vec::new();
     for r in st.challengers(list, &beside, 14) {
         if r.same(c) {
             continue;
         }
+        // what it gains in place of the member, not what it would gain beside it
+        let mut both = set.to_vec();
+        both.push(r.clone());
+        let instead = r.gain - (st.fit(&both).0.gain - f1.gain);
+        let other = match frozen {
+            true => {
+                let mut alone = rest.clone();
+                alone.push(r.clone());
+                let (fit, residual) = st.fit(&alone);
+                let fall = surprise_without - st.surprise(&fit, &residual);
+                st.merit_of(&r, fall.min(instead), PRICE)
+            }
+            false => st.merit_of(&r, instead, st.price()),
+        };
         // what each would leave: the member what it leaves, the rival that and what it gains less
-        let less = own - st.merit(&r);
+        let less = own - other;
         let left = if frozen {
             (surprise_after - free).max(0.0) + 12.0
         } else {
@@ -584,7 +623,7 @@ fn judge(
         }
     }
     let size = if frozen {
-        logistic((surprise_without - surprise_after - SURPRISE) / 12.0)
+        logistic((fall - SURPRISE) / 12.0)
     } else {
         logistic((chi_gain / rows - LEAST) / 0.02)
     };
@@ -629,10 +668,25 @@ fn judge(
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
     let spread = 2.0 * gain.max(0.0).sqrt() / total.max(1.0);
-    // what explains next to nothing of the whole, or nothing where it was not fitted, is no finding
+    // what explains next to nothing on its joints, or nothing where it was not fitted, is no finding
     let matters = match frozen {
         true => 1.0,
-        false => logistic((explains.min(holdout) - LEAST_SHARE) / 0.005),
+        false => {
+            let over = |gap: &[f64], rows: usize| -> f64 {
+                let floor = st.floor * rows as f64;
+                joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
+            };
+            let gone = |before: f64, after: f64| (before - after) / before.max(1e-9);
+            let seen = gone(over(&without, data.fitted), over(after, data.fitted));
+            let unseen = match held {
+                0 => seen,
+                _ => gone(
+                    over(&st.gap(&r0, false), held),
+                    over(&st.gap(&r1, false), held),
+                ),
+            };
+            logistic((seen.min(unseen) - LEAST_SHARE) / 0.01)
+        }
     };
     let together = size
         * matters

@@ -47,9 +47,10 @@ impl Effect for BaseCompliance {
         })
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &[usize], shape: &[f64], eta: &[f64]) -> bool {
+        // a coefficient below 1 is a base that is heavy itself; one that swings slowly cannot be
         let largest = eta.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        eta.iter().all(|t| *t > -0.3 * largest)
+        eta.iter().all(|t| *t > -0.3 * largest) && (largest > 0.4 || shape[0] > 25.0)
     }
 
     fn values(

@@ -16,6 +16,10 @@ impl Effect for CableSpring {
             separated_by: "slow full range with and without the dress pack",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         cx.singles()
     }

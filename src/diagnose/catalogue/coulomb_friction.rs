@@ -16,6 +16,10 @@ impl Effect for CoulombFriction {
             separated_by: "reversals at several speeds",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         cx.without(JointTerm::Coulomb)
     }

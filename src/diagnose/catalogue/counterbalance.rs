@@ -16,6 +16,10 @@ impl Effect for Counterbalance {
             separated_by: "poses with and without payload; the pressure of the cylinder",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         if !cx.serial() {
             return Vec::new();

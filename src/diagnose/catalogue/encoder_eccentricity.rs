@@ -16,6 +16,10 @@ impl Effect for EncoderEccentricity {
             separated_by: "full turns of the joint",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         if !cx.serial() {
             return Vec::new();

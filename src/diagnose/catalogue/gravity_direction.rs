@@ -16,6 +16,10 @@ impl Effect for GravityDirection {
             separated_by: "a slow full turn of a vertical first joint with the arm stretched, with two payloads",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         if cx.serial() {
             vec![Vec::new()]

@@ -16,6 +16,10 @@ impl Effect for JointOffset {
             separated_by: "a calibration; poses that differ in gravity",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         if cx.serial() {
             cx.singles()

@@ -16,6 +16,10 @@ impl Effect for LegInertia {
             separated_by: "large rotations of the platform",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         if cx.serial() {
             Vec::new()

@@ -16,6 +16,10 @@ impl Effect for LinkInertia {
             separated_by: "motions that move the link in several poses of the joints before it",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         if !cx.serial() {
             return Vec::new();

@@ -103,6 +103,11 @@ pub trait Effect: Sync {
     fn refinable(&self, _k: usize) -> bool {
         false
     }
+    /// Whether a refit of ordinary parameters may absorb it without a trace, so that values which are
+    /// unlikely under their prior are its only sign.
+    fn hides(&self) -> bool {
+        false
+    }
     /// Columns, per unit of the coefficients. A `draft` may leave out rows of lesser weight.
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column>;
     /// Whether coefficients make physical sense.

@@ -16,6 +16,10 @@ impl Effect for Payload {
             separated_by: "the same motion with and without the load, and several static poses of the wrist",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         match (cx.serial(), cx.data.plant.robot().bodies.last()) {
             (true, Some(last)) => vec![vec![last.coordinate]],

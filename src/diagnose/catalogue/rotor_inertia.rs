@@ -16,6 +16,10 @@ impl Effect for RotorInertia {
             separated_by: "other poses of the arm: the inertia of links varies, that of the rotor does not",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         cx.without(JointTerm::Armature)
     }

@@ -16,6 +16,10 @@ impl Effect for TorqueConstant {
             separated_by: "one payload of known mass",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         cx.singles()
     }

@@ -16,6 +16,10 @@ impl Effect for TorqueOffset {
             separated_by: "holding torque in several poses",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         cx.without(JointTerm::Offset)
     }

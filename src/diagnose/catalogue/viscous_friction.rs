@@ -16,6 +16,10 @@ impl Effect for ViscousFriction {
             separated_by: "at least three speeds",
         }
     }
+    fn hides(&self) -> bool {
+        true
+    }
+
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         cx.without(JointTerm::Viscous)
     }
