@@ -102,6 +102,10 @@ const FLOOR: f64 = 0.25;
 const SLACK: f64 = 0.05;
 /// Share of the gap on its joints, on fitted and on holdout records, that an effect must explain.
 const LEAST_SHARE: f64 = 0.05;
+/// The same of the gap of all joints.
+const LEAST_OF_ALL: f64 = 0.012;
+/// Share explained on holdout records over that on fitted ones, at least.
+const HELD: f64 = 0.4;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
 
@@ -668,7 +672,7 @@ fn judge(
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
     let spread = 2.0 * gain.max(0.0).sqrt() / total.max(1.0);
-    // what explains next to nothing on its joints, or nothing where it was not fitted, is no finding
+    // what explains next to nothing, or nothing where it was not fitted, is no finding
     let matters = match frozen {
         true => 1.0,
         false => {
@@ -686,6 +690,8 @@ fn judge(
                 ),
             };
             logistic((seen.min(unseen) - LEAST_SHARE) / 0.01)
+                * logistic((explains.min(holdout) - LEAST_OF_ALL) / 0.003)
+                * logistic((holdout - HELD * explains) / (0.05 * explains.max(1e-9)))
         }
     };
     let together = size
