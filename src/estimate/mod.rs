@@ -18,6 +18,7 @@ pub mod essential;
 pub mod json;
 pub mod linear;
 pub mod lmi;
+pub mod mechanism;
 pub mod robot;
 pub mod stack;
 pub mod uncertainty;
