@@ -52,6 +52,15 @@ pub fn forward(mechanism: &Mechanism, q: &[Vec<f64>]) -> Result<Vec<f64>> {
     Ok(x)
 }
 
+/// Measured rates of the coordinates, one list each.
+#[derive(Debug, Clone)]
+pub struct Rates {
+    /// velocities
+    pub velocity: Vec<Vec<f64>>,
+    /// accelerations, where they were measured
+    pub acceleration: Option<Vec<Vec<f64>>>,
+}
+
 /// Velocities of the coordinates, and accelerations where there are any, from measured ones of the
 /// actuators along the positions `x`; one list a coordinate or actuator:
 ///
@@ -66,7 +75,7 @@ pub fn rates(
     x: &[Vec<f64>],
     dq: &[Vec<f64>],
     ddq: Option<&[Vec<f64>]>,
-) -> Result<(Vec<Vec<f64>>, Option<Vec<Vec<f64>>>)> {
+) -> Result<Rates> {
     let (m, n) = (x.len(), mechanism.actuators());
     let mut samples = Samples::zeros(m, x.first().map_or(0, Vec::len));
     let count = samples.count;
@@ -84,13 +93,19 @@ pub fn rates(
     };
     let xd = through(&|a, s| dq[a][s]);
     let Some(ddq) = ddq else {
-        return Ok((xd, None));
+        return Ok(Rates {
+            velocity: xd,
+            acceleration: None,
+        });
     };
     samples.qd = xd.concat();
     let bend = mechanism.motion(&samples)?.tree.qdd;
     let at = |a: usize, s: usize| bend[mechanism.actuated[a] * count + s];
     let xdd = through(&|a, s| ddq[a][s] - at(a, s));
-    Ok((xd, Some(xdd)))
+    Ok(Rates {
+        velocity: xd,
+        acceleration: Some(xdd),
+    })
 }
 
 /// Task coordinates from measured pose columns `x y z qw qx qy qz`.

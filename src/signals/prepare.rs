@@ -73,8 +73,9 @@ impl Prepared {
     fn aperiodic(record: &Record, plant: &Plant, settings: &Settings) -> Result<Prepared> {
         let rate = record.rate();
         let x = coordinates(record, plant, settings)?;
-        let (dq, ddq) = measured_rates(record, plant, settings, &x)?;
-        let (dq, ddq) = (dq.as_deref(), ddq.as_deref());
+        let measured = measured_rates(record, plant, settings, &x)?;
+        let dq = measured.as_ref().map(|m| &m.velocity);
+        let ddq = measured.as_ref().and_then(|m| m.acceleration.as_ref());
         let series: Vec<(f64, Rates)> = x
             .par_iter()
             .enumerate()
@@ -326,9 +327,6 @@ fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
     Ok(p)
 }
 
-/// Measured rates of the coordinates, or of none: velocities and accelerations.
-type Measured = (Option<Vec<Vec<f64>>>, Option<Vec<Vec<f64>>>);
-
 /// Velocities and accelerations of the coordinates where the log has those of the actuators and they
 /// are wanted.
 fn measured_rates(
@@ -336,15 +334,17 @@ fn measured_rates(
     plant: &Plant,
     settings: &Settings,
     x: &[Vec<f64>],
-) -> Result<Measured> {
+) -> Result<Option<platform::Rates>> {
     let Some(dq) = record.dq.as_ref().filter(|_| settings.measured_rates) else {
-        return Ok((None, None));
+        return Ok(None);
     };
     let Some(mechanism) = plant.mechanism() else {
-        return Ok((Some(dq.clone()), record.ddq.clone()));
+        return Ok(Some(platform::Rates {
+            velocity: dq.clone(),
+            acceleration: record.ddq.clone(),
+        }));
     };
-    let (xd, xdd) = platform::rates(mechanism, x, dq, record.ddq.as_deref())?;
-    Ok((Some(xd), xdd))
+    platform::rates(mechanism, x, dq, record.ddq.as_deref()).map(Some)
 }
 
 /// Coordinates over the whole record.
