@@ -1,7 +1,7 @@
 //! Which estimator? Monte Carlo over rehearsed runs of a UR5e with friction: torque error on a motion that
 //! was not fitted, without noise, for every estimator and four kinds of trouble.
 //!
-//! cargo run --release --example 05_estimators [RUNS]
+//! `cargo run --release --example 05_estimators [RUNS]`, 20 runs a row
 
 use excite::dynamics::Samples;
 use excite::estimate::{Consistency, Method, Settings, identify};
@@ -94,7 +94,7 @@ fn main() -> excite::Result<()> {
     let runs: u64 = std::env::args()
         .nth(1)
         .and_then(|a| a.parse().ok())
-        .unwrap_or(10);
+        .unwrap_or(20);
     let mut robot = Robot::load("ur5e")?.with_terms(&JointTerm::ALL);
     for joint in &mut robot.joints {
         joint.terms = [0.3, 5.0, 4.0, 0.5];

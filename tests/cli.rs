@@ -371,7 +371,17 @@ fn interrupt_keeps_the_best() {
 #[test]
 fn every_command_has_help_with_an_example() {
     let t = Test::new();
-    for command in ["design", "identifiability", "torque", "robots", "new"] {
+    for command in [
+        "design",
+        "identifiability",
+        "simulate",
+        "identify",
+        "load",
+        "diagnose",
+        "torque",
+        "robots",
+        "new",
+    ] {
         let out = t.run(&format!("{command} --help"));
         assert_eq!(out.status, 0);
         assert!(out.stdout.contains("Example"), "{command}");

@@ -194,7 +194,8 @@ fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
     }
 }
 
-/// The same for closed chains, from the positions of the actuators alone: forward kinematics, periods.
+/// The same for closed chains, from the positions of the actuators alone (forward kinematics, periods) and with
+/// their measured rates (as they stand).
 #[test]
 fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise() {
     for name in excite::mechanism::bundled::list().iter().map(|b| b.name) {
@@ -230,7 +231,7 @@ fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise
                 .for_each(|v| *v += middle);
         }
         let tau = plant.torque(&x, &phi).unwrap();
-        let q = plant.actuator_motion(&x).unwrap().q;
+        let motion = plant.actuator_motion(&x).unwrap();
         let twice = |list: &[f64]| -> Vec<Vec<f64>> {
             let rows = list.chunks_exact(each);
             rows.map(|row| [row, row].concat()).collect()
@@ -244,7 +245,7 @@ fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise
             step: 1.0 / rate,
             t: (0..2 * each).map(|i| i as f64 / rate).collect(),
             valid: vec![true; 2 * each],
-            q: twice(&q),
+            q: twice(&motion.q),
             tau: twice(&tau),
             dq: None,
             ddq: None,
@@ -260,11 +261,25 @@ fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise
             prior_strength: Some(1e-2),
             ..Settings::default()
         };
-        let id = identify(&plant, &[record], &settings).unwrap();
-        let e = worst(&id, &phi, &id.pi);
-        println!("{name}: {e:.1e}");
-        assert!(e < 1e-8, "{name}: {e:.2e}");
-        assert!(id.consistent, "{name}: {:?}", id.margin);
+        let measured = Record {
+            period: None,
+            dq: Some(twice(&motion.qd)),
+            ddq: Some(twice(&motion.qdd)),
+            ..record.clone()
+        };
+        for r in [record, measured] {
+            let rates = r.dq.is_some();
+            let id = identify(&plant, &[r], &settings).unwrap();
+            let e = worst(&id, &phi, &id.pi);
+            println!("{name}, rates {rates}: {e:.1e}");
+            assert!(e < 1e-8, "{name}, rates {rates}: {e:.2e}");
+            assert!(id.consistent, "{name}: {:?}", id.margin);
+            let unfiltered = id.prepared[0]
+                .position_cutoff
+                .iter()
+                .all(|f| f.is_infinite());
+            assert_eq!(unfiltered, rates, "{name}");
+        }
     }
 }
 
@@ -491,6 +506,78 @@ fn what_the_motion_does_not_show_is_named() {
         "{text:#?}"
     );
     assert!(id.phi.iter().all(|x| x.is_finite()) && id.consistent);
+}
+
+/// A joint that is held by its friction for half of the record, its encoder trembling, does not spoil the fit.
+#[test]
+fn standstill_is_left_out() {
+    let (plant, phi) = truth("planar2", 4);
+    let mut run = record(&plant, &phi, Purpose::Fit, &Run::default());
+    run.period = None;
+    let n = run.len();
+    // the first joint runs through its motion, then stays where that began; the second goes on
+    let half = n / 2;
+    let fifth = run.q[0][0];
+    let blend = |i: usize| {
+        let x = ((i as f64 - half as f64) / 200.0).clamp(0.0, 1.0);
+        1.0 - x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    };
+    run.q[0] = (0..n)
+        .map(|i| fifth + (run.q[0][i] - fifth) * blend(i))
+        .collect();
+    let exact: Vec<Vec<f64>> = run.q.clone();
+    let rates = |q: &[f64]| -> Vec<f64> {
+        let at = |i: usize, d: isize| q[(i as isize + d).clamp(0, n as isize - 1) as usize];
+        (0..n)
+            .map(|i| (at(i, 1) - at(i, -1)) / (2.0 * run.step))
+            .collect()
+    };
+    let qd: Vec<Vec<f64>> = exact.iter().map(|q| rates(q)).collect();
+    let x = excite::dynamics::Samples {
+        dof: 2,
+        count: n,
+        qdd: qd.iter().flat_map(|v| rates(v)).collect(),
+        qd: qd.concat(),
+        q: exact.concat(),
+    };
+    let tau = plant.torque(&x, &phi).unwrap();
+    run.tau = tau.chunks_exact(n).map(<[f64]>::to_vec).collect();
+    let index = |name: &str| {
+        plant
+            .parameters()
+            .iter()
+            .position(|p| p.name == name)
+            .unwrap()
+    };
+    let joint = plant.robot().joints[0].name.clone();
+    let coulomb = phi[index(&format!("{joint}.coulomb"))];
+    for i in half + 200..n {
+        // at rest friction holds most of what it can
+        run.tau[0][i] += 0.9 * coulomb;
+    }
+    let r = &mut rng(8);
+    for q in run.q.iter_mut().flatten() {
+        *q += 2e-6 * normal(r);
+    }
+    let settings = Settings {
+        prior_strength: Some(1e-2),
+        ..Settings::default()
+    };
+    let id = identify(&plant, &[run], &settings).unwrap();
+    let told: Vec<String> = id.warnings.iter().map(ToString::to_string).collect();
+    assert!(
+        told.iter()
+            .any(|t| t.contains("standstill") && t.contains(&joint)),
+        "{told:#?}"
+    );
+    let exact = id.base.project(&phi);
+    for (k, (a, b)) in exact.iter().zip(&id.pi).enumerate() {
+        let name = id.base.name(k);
+        println!("{name}: {a:.4} {b:.4}");
+        if name == format!("{joint}.offset") || name == format!("{joint}.coulomb") {
+            assert!((a - b).abs() < 0.05 * coulomb, "{name}: {a} {b}");
+        }
+    }
 }
 
 #[test]

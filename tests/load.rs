@@ -71,6 +71,7 @@ fn prepared(name: &str, x: &Samples, torque: Vec<f64>, rate: f64) -> Prepared {
         time: (0..count).map(|i| i as f64 / rate).collect(),
         motion: x.clone(),
         actuators: torque.len() / count,
+        velocity_noise: vec![0.0; torque.len() / count],
         torque,
         filter: Decimator::new(f64::INFINITY, rate, &valid, true),
         valid,

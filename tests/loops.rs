@@ -526,3 +526,48 @@ fn the_layout_of_example_parallel_robots_is_read() {
             .contains("no URDF beside it")
     );
 }
+
+/// Other values written to a robot file and its URDF are the values that are read from them.
+#[test]
+fn an_identified_tree_with_loops_is_written_and_read() {
+    use excite::estimate::{mechanism, robot};
+    use excite::plant::Plant;
+    let frames = "lock = { pin = 0.0 }\nactuated = [\"motor_left\", \"motor_right\"]\n\
+                  [[joint]]\nname = \"motor_left\"\nidentify = [\"armature\", \"coulomb\", \"offset\"]\n\
+                  [[loop]]\nframes = [{ link = \"tip\", position = [0.01, 0, 0], rpy = [0.1, 0.2, 0.3] }, \
+                  { link = \"right2\", position = [0.31, 0, 0], rpy = [0.1, 0.2, 0.3] }]\ncoincide = \"position\"\n";
+    for rest in [POINT, POSE, REDUNDANT, frames] {
+        let plant = Plant::Parallel(Box::new(five_bar(rest).unwrap()));
+        let mut phi = plant.values();
+        let r = &mut common::rng(7);
+        let bodies = 10 * plant.mechanism().unwrap().parameters.bodies.len();
+        for body in phi[..bodies].chunks_exact_mut(10) {
+            let f = r.random_range(0.8..1.2);
+            body.iter_mut().for_each(|x| *x *= f);
+        }
+        phi[bodies..].iter_mut().for_each(|x| *x += 0.1);
+        let m = plant.mechanism().unwrap();
+        let tree = robot::with_values(&plant, &phi);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("robot.toml");
+        let toml = mechanism::toml(m, &tree, "identified.urdf").unwrap();
+        println!("{toml}");
+        std::fs::write(&path, &toml).unwrap();
+        std::fs::write(folder.path().join("identified.urdf"), robot::urdf(&tree)).unwrap();
+        let again = Mechanism::load(path.to_str().unwrap()).unwrap().unwrap();
+        assert_eq!(again.actuator_names(), m.actuator_names());
+        assert_eq!(again.task_names, m.task_names);
+        assert_eq!(again.parameters.list.len(), m.parameters.list.len());
+        let off = worst(&again.home, &m.home);
+        assert!(off < 1e-12, "{off}");
+        for (a, b) in again.workspace.iter().zip(&m.workspace) {
+            assert!((a.position[0] - b.position[0]).abs() < 1e-12, "{a:?} {b:?}");
+        }
+        let x = m.random_states(30, 5);
+        let off = worst(
+            &again.nominal_torque(&x).unwrap(),
+            &plant.torque(&x, &phi).unwrap(),
+        );
+        assert!(off < 1e-9, "{rest}: {off:e}");
+    }
+}

@@ -504,3 +504,82 @@ fn motions_that_the_platform_cannot_do_are_refused() {
         "{error}"
     );
 }
+
+/// Other values written to a robot file are the values that are read from it.
+#[test]
+fn an_identified_mechanism_is_written_and_read() {
+    use excite::estimate::{mechanism, robot};
+    use rand::Rng;
+    let [hexapod, h4, delta] = ["hexapod", "h4", "delta"].map(|n| bundled::find(n).unwrap().toml);
+    let terms = "identify = [\"armature\", \"viscous\", \"coulomb\", \"offset\"]";
+    let usual = "identify = [\"viscous\", \"coulomb\"]";
+    let apart = |text: &str| text.replace("identical = true", "identical = false");
+    let files = [
+        hexapod.to_string(),
+        hexapod.replace(usual, terms),
+        apart(hexapod),
+        apart(hexapod).replace("axisymmetric = true", "axisymmetric = false"),
+        hexapod.replace(
+            "axisymmetric = true",
+            "axisymmetric = true\nspherical = true",
+        ),
+        hexapod.replace("bodies = \"legs\"", "bodies = \"platform\""),
+        h4.to_string(),
+        apart(h4).replace(usual, terms),
+        h4.replace("model = \"rods\"", "model = \"lumped\""),
+        h4.replace("model = \"rods\"", "model = \"lumped-gravity\""),
+        delta.to_string(),
+        apart(delta).replace(usual, terms),
+        format!(
+            "{delta}\n[[joint]]\nname = \"rod2a_gamma\"\nviscous = 0.01\nidentify = [\"viscous\"]\n"
+        ),
+    ];
+    for (i, text) in files.iter().enumerate() {
+        let m = Mechanism::from_toml_str(text, "robot.toml").unwrap();
+        let plant = Plant::Parallel(Box::new(m));
+        let m = plant.mechanism().unwrap();
+        // every body by a factor of its own, so that it stays one that can exist
+        let r = &mut common::rng(i as u64);
+        let mut factor = std::collections::HashMap::new();
+        let phi: Vec<f64> = (m.parameters.list.iter())
+            .map(|p| {
+                let of = p.name.split('.').next().unwrap().to_string();
+                p.value * *factor.entry(of).or_insert_with(|| r.random_range(0.8..1.2))
+            })
+            .collect();
+        let tree = robot::with_values(&plant, &phi);
+        let toml = mechanism::toml(m, &tree, "robot.urdf").unwrap();
+        let again = match Mechanism::from_toml_str(&toml, "robot.toml") {
+            Ok(again) => again,
+            Err(e) => panic!("{e}\n{toml}"),
+        };
+        assert_eq!(again.warnings, m.warnings, "{i}\n{toml}");
+        assert_eq!(again.margins, m.margins);
+        let names = |m: &Mechanism| -> Vec<String> {
+            m.parameters.list.iter().map(|p| p.name.clone()).collect()
+        };
+        assert_eq!(names(&again), names(m));
+        let x = m.random_states(50, 9);
+        let (a, b) = (
+            plant.torque(&x, &phi).unwrap(),
+            again.nominal_torque(&x).unwrap(),
+        );
+        let size = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let off = a
+            .iter()
+            .zip(&b)
+            .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        println!("{i}: off by {:.1e}", off / size);
+        assert!(off < 1e-12 * size, "{i}: {off:e}\n{toml}");
+    }
+    // what a file cannot carry is said
+    let plant = Plant::Parallel(Box::new(bundled::find("delta").unwrap().load().unwrap()));
+    let mut phi = plant.values();
+    phi[0] = -0.1;
+    let tree = robot::with_values(&plant, &phi);
+    let m = plant.mechanism().unwrap();
+    let e = mechanism::toml(m, &tree, "robot.urdf")
+        .unwrap_err()
+        .to_string();
+    assert!(e.contains("arm1") && e.contains("-0.1 kg"), "{e}");
+}

@@ -1,7 +1,9 @@
 //! `excite identify EXPERIMENT`.
 
 use super::{pretty, print, warn, write};
-use excite::estimate::{Consistency, Identification, Method, Settings, identify, json, robot};
+use excite::estimate::{
+    Consistency, Identification, Method, Settings, identify, json, mechanism, robot,
+};
 use excite::log::Experiment;
 use excite::output::prepare_dir;
 use excite::report::after;
@@ -16,8 +18,8 @@ use std::time::Instant;
 #[command(
     long_about = "Identify the model from recorded runs: base parameters with honest uncertainty, and standard \
                   parameters that a robot can have, validated on records that were not fitted.\n\nWrites \
-                  model.json, robot.urdf (identified inertia and friction), robot.xml (the same for MuJoCo), \
-                  robot.toml, report.json and report.html.",
+                  model.json, robot.urdf (identified inertia and friction), robot.xml (the same for MuJoCo; \
+                  serial robots), robot.toml, report.json and report.html.",
     after_help = "Examples:\n  excite identify experiment.toml\n  excite identify experiment.toml --output run1 \
                   --method robust --cutoff 20\n  excite identify experiment.toml --identify none --prior 100"
 )]
@@ -82,7 +84,7 @@ pub fn run(args: Args) -> Result<()> {
     let serial = experiment.plant.mechanism().is_none();
     let wanted: Vec<&str> = files
         .into_iter()
-        .filter(|f| serial || !matches!(*f, "robot.toml" | "robot.xml"))
+        .filter(|f| serial || *f != "robot.xml")
         .collect();
     let mut settings = Settings {
         method: match args.method.as_str() {
@@ -105,19 +107,21 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.average = !args.no_average;
     settings.signals.measured_rates = !args.derive;
     let paths = prepare_dir(&args.output, &wanted, args.force)?;
-    let path = |name: &str| {
-        wanted
-            .iter()
-            .position(|f| *f == name)
-            .map(|k| paths[k].clone())
-    };
 
     let plant = &experiment.plant;
     let mut id = identify(plant, &experiment.records, &settings)?;
     id.warnings.splice(0..0, notes);
+    let robot = robot::with_values(plant, &id.phi);
+    let file = match plant.mechanism() {
+        None => Ok(robot.to_toml_template("robot.urdf")),
+        Some(m) => mechanism::toml(m, &robot, "robot.urdf"),
+    };
+    if let Err(e) = &file {
+        let message = format!("not written: {e}; the values are in model.json");
+        id.warnings.push(Warning::new("robot.toml", message));
+    }
     warn(&id.warnings);
     let (_, verdict) = after::verdict(plant, &id);
-    let robot = robot::with_values(plant, &id.phi);
     let report = json::report(
         plant,
         &id,
@@ -133,11 +137,15 @@ pub fn run(args: Args) -> Result<()> {
     ];
     if serial {
         texts.push(("robot.xml", robot::mujoco(&robot)));
-        texts.push(("robot.toml", robot.to_toml_template("robot.urdf")));
     }
-    for (name, text) in &texts {
-        if let Some(p) = path(name) {
-            write(&p, args.force, text)?;
+    if let Ok(text) = file {
+        texts.push(("robot.toml", text));
+    }
+    let mut written = Vec::new();
+    for (name, path) in wanted.iter().zip(&paths) {
+        if let Some((_, text)) = texts.iter().find(|(n, _)| n == name) {
+            write(path, args.force, text)?;
+            written.push(path.clone());
         }
     }
     match args.json {
@@ -145,7 +153,7 @@ pub fn run(args: Args) -> Result<()> {
         false => print(&summary(
             &id,
             &verdict,
-            &paths,
+            &written,
             begin.elapsed().as_secs_f64(),
         )),
     }

@@ -109,6 +109,10 @@ fn free(s: &mut Stack, a: usize, signals: Vec<Vec<f64>>) {
     let m = s.count;
     let mut basis: Vec<Vec<f64>> = Vec::new();
     for mut g in signals {
+        let out = &s.left_out[a * m..(a + 1) * m];
+        g.iter_mut()
+            .zip(out)
+            .for_each(|(x, out)| *x *= f64::from(!*out));
         let before = g.iter().map(|x| x * x).sum::<f64>().sqrt();
         // twice is enough (Giraud, Langou & Rozložník 2005)
         for _ in 0..2 {

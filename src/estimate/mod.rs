@@ -5,6 +5,7 @@
 //! ```
 //!
 //! 1. [`stack`]: the filtered equations `W_b π = τ` of each record.
+//!    Those of joints that stand still are left out of the fit ([`standstill`]).
 //! 2. [`Method`]: base parameters `π̂` and their information `Λ`, from rows compressed by blocks
 //!    ([`linear`]).
 //! 3. [`uncertainty`]: their covariance with the residual's correlation in time.
@@ -18,8 +19,10 @@ pub mod essential;
 pub mod json;
 pub mod linear;
 pub mod lmi;
+pub mod mechanism;
 pub mod robot;
 pub mod stack;
+pub mod standstill;
 pub mod uncertainty;
 pub mod validation;
 pub mod weights;
@@ -208,7 +211,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         .copied()
         .filter(|r| r.purpose == Purpose::Fit)
         .collect();
-    let rows: usize = fit.iter().map(|s| s.actuators * s.count).sum();
+    let rows: usize = fit.iter().map(|s| s.equations()).sum();
     if rows < base.count() {
         return Err(Error::Infeasible(format!(
             "{rows} filtered equations cannot give {} base parameters: record longer, or raise the cut-off",
@@ -216,6 +219,14 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         )));
     }
     warnings.extend(validation::unit_suspicions(plant, &base, &fit));
+
+    let (moving, note) = standstill::left_out(plant, &fit, &fit_prepared)?;
+    warnings.extend(note);
+    let fit: Vec<&Stack> = match &moving {
+        Some(stacks) => stacks.iter().collect(),
+        None => fit,
+    };
+    let rows: usize = fit.iter().map(|s| s.equations()).sum();
 
     // the method
     let first = base_estimate(plant, &base, &fit, &fit_prepared, &fit_records, settings)?;

@@ -49,13 +49,13 @@ fn escape(text: &str) -> String {
 }
 
 /// Roll, pitch and yaw of a rotation.
-fn rpy(r: &Matrix3<f64>) -> [f64; 3] {
+pub(super) fn rpy(r: &Matrix3<f64>) -> [f64; 3] {
     let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(*r).euler_angles();
     [roll, pitch, yaw]
 }
 
 /// A name for the base that no link has.
-fn base_name(robot: &Robot) -> String {
+pub(super) fn base_name(robot: &Robot) -> String {
     let mut name = String::from("base");
     while robot.bodies.iter().any(|b| b.name == name) {
         name.push('_');

@@ -32,6 +32,8 @@ pub struct Stack {
     pub measured: Vec<f64>,
     /// the known part of the torque, filtered
     pub known: Vec<f64>,
+    /// equations that do not count and are zero, in the order of the rows
+    pub left_out: Vec<bool>,
 }
 
 /// Samples of the motion that a thread works on at least.
@@ -130,7 +132,30 @@ impl Stack {
             w,
             measured: p.filtered(&p.torque),
             known,
+            left_out: vec![false; n * m],
         })
+    }
+
+    /// Leaves the equation of an actuator at a sample out: it becomes `0 = 0`.
+    pub fn leave_out(&mut self, a: usize, k: usize) {
+        let row = a * self.count + k;
+        for c in 0..self.w.ncols() {
+            self.w[(row, c)] = 0.0;
+        }
+        self.measured[row] = 0.0;
+        self.known[row] = 0.0;
+        self.left_out[row] = true;
+    }
+
+    /// Number of equations of an actuator that count.
+    pub fn used(&self, a: usize) -> usize {
+        let rows = &self.left_out[a * self.count..(a + 1) * self.count];
+        rows.iter().filter(|out| !**out).count()
+    }
+
+    /// Number of equations that count.
+    pub fn equations(&self) -> usize {
+        (0..self.actuators).map(|a| self.used(a)).sum()
     }
 
     /// Measured torque less the known part: the right-hand side.

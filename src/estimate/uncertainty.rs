@@ -43,13 +43,14 @@ fn pair(a: &[f64], b: &[f64]) -> [Vec<Complex>; 2] {
     out
 }
 
-/// Spectrum of a residual, 1 for white noise of unit variance, smoothed over about `√m` bins.
-fn smooth_spectrum(e: &[f64]) -> Vec<f64> {
+/// Spectrum of a residual of which `used` samples are not left out (zero), 1 for white noise of unit
+/// variance, smoothed over about `√m` bins.
+fn smooth_spectrum(e: &[f64], used: usize) -> Vec<f64> {
     let m = e.len();
     let [s, _] = pair(e, e);
     let raw: Vec<f64> = s
         .iter()
-        .map(|c| (c[0] * c[0] + c[1] * c[1]) / m as f64)
+        .map(|c| (c[0] * c[0] + c[1] * c[1]) / used.max(1) as f64)
         .collect();
     let half = raw.len();
     let wide = ((m as f64).sqrt() / 4.0).ceil().max(2.0) as isize;
@@ -87,7 +88,7 @@ pub fn covariance(
     r: MatRef<'_, f64>,
 ) -> Result<Covariance> {
     let b = pi.len();
-    let rows: usize = stacks.iter().map(|s| s.actuators * s.count).sum();
+    let rows: usize = stacks.iter().map(|s| s.equations()).sum();
     let freedom = rows as f64 / (rows.saturating_sub(b)).max(1) as f64;
     let mut jobs = Vec::new();
     let blocks: Vec<Mat<f64>> = stacks
@@ -107,7 +108,7 @@ pub fn covariance(
             let residual: Vec<f64> = (0..m)
                 .map(|k| block[(k, b)] - (0..b).map(|c| block[(k, c)] * pi[c]).sum::<f64>())
                 .collect();
-            let density = smooth_spectrum(&residual);
+            let density = smooth_spectrum(&residual, stacks[i].used(a));
             let half = density.len();
             let mut z = Mat::<f64>::zeros(2 * half, b);
             for c in (0..b).step_by(2) {

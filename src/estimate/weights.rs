@@ -10,13 +10,16 @@ use faer::Mat;
 use rayon::prelude::*;
 
 /// Covariance of the residual between actuators, over all records, with the degrees of freedom that
-/// the fit took.
+/// the fit took. Equations that are left out do not count; the correlation of two actuators is then
+/// too small by the geometric mean of what counts of both, which keeps the matrix definite.
 pub fn residual_covariance(stacks: &[&Stack], pi: &[f64]) -> Mat<f64> {
     let n = stacks.first().map_or(0, |s| s.actuators);
     let residuals: Vec<Vec<f64>> = stacks.par_iter().map(|s| s.residual(pi)).collect();
-    let samples: usize = stacks.iter().map(|s| s.count).sum();
     let taken = pi.len() as f64 / n.max(1) as f64;
-    let freedom = (samples as f64 - taken).max(1.0);
+    let freedom = |a: usize| {
+        let used: usize = stacks.iter().map(|s| s.used(a)).sum();
+        (used as f64 - taken).max(1.0)
+    };
     Mat::from_fn(n, n, |a, b| {
         let sum: f64 = stacks
             .iter()
@@ -27,7 +30,7 @@ pub fn residual_covariance(stacks: &[&Stack], pi: &[f64]) -> Mat<f64> {
                     .sum::<f64>()
             })
             .sum();
-        sum / freedom
+        sum / (freedom(a) * freedom(b)).sqrt()
     })
 }
 

@@ -76,8 +76,13 @@ pub fn parse(cell: &[u8]) -> Option<f64> {
         }
         exponent += if minus { -e } else { e };
     }
-    if i != n || mantissa >= 1 << 53 || !(-22..=22).contains(&exponent) {
+    if i != n {
         return slow(cell);
+    }
+    if mantissa >= 1 << 53 || !(-22..=22).contains(&exponent) {
+        // a sound number of more digits, as programs write them that keep every bit
+        let x: f64 = std::str::from_utf8(cell).ok()?.parse().ok()?;
+        return Some(if x.is_finite() { x } else { f64::NAN });
     }
     let m = mantissa as f64;
     let x = match exponent < 0 {

@@ -12,6 +12,7 @@
 //! q = F(x)     q̇ = D ẋ     q̈ = D ẍ + F_xx[ẋ, ẋ]
 //! ```
 
+use super::loops::Closure;
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
 #[cfg(all(target_arch = "x86_64", feature = "wide"))]
@@ -127,6 +128,11 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
     /// first actuators.
     fn task_joints(&self) -> Option<&[usize]> {
         None
+    }
+
+    /// The closures, where the mechanism is a tree with loops.
+    fn closures(&self) -> &[Closure] {
+        &[]
     }
 
     /// Whether each sample starts from the solution of the one before, so that a batch must not be

@@ -100,6 +100,8 @@ pub struct Mechanism {
     pub margins: Margins,
     /// what was imperfect, a home close to a singularity among them
     pub warnings: Vec<Warning>,
+    /// text of the robot file it was read from; empty where it was put together in code
+    pub source: String,
     geometry: Box<dyn Geometry>,
     tree: Tree,
 }
@@ -199,6 +201,7 @@ impl Mechanism {
             length,
             margins: Margins::default(),
             warnings,
+            source: String::new(),
             geometry,
             tree,
         };

@@ -46,6 +46,31 @@ fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
     high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
 }
 
+/// Spectrum of a position, one-sided, units²/Hz: that of its first difference, which has no trend to
+/// leak, divided by the difference's own.
+fn spectrum_of(q: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
+    let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
+    let (f, mut density) = welch(&difference, rate, length);
+    for (f, d) in f.iter().zip(&mut density) {
+        let gain = 2.0 * (PI * f / rate).sin();
+        *d /= (gain * gain).max(1e-300);
+    }
+    density[0] = 0.0;
+    (f, density)
+}
+
+/// Noise floor of a channel, units²/Hz: the median of its spectrum between 0.3 and 0.45 of the rate.
+pub fn floor(q: &[f64], rate: f64) -> f64 {
+    let (f, density) = spectrum_of(q, rate, (rate as usize).clamp(64, (q.len() / 2).max(64)));
+    noise_floor(&f, &density, rate)
+}
+
+/// Standard deviation of the velocity that white noise of this floor, units²/Hz, makes of positions that
+/// are cut off at `frequency`: `2π √(S f³/3)`.
+pub fn velocity_noise(floor: f64, frequency: f64) -> f64 {
+    2.0 * PI * (floor * frequency.powi(3) / 3.0).sqrt()
+}
+
 /// Frequency below which 99.99 % of the power of the position's changes lies, Hz: the band of the
 /// motion. A hundredth of the amplitude lies above it.
 pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
@@ -82,19 +107,10 @@ pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
 /// `order` is that of one pass of the Butterworth filter, whose gain `1/(1 + (f/f_c)^{2N})` decides what
 /// passes. What is lost of the signal is the same in every sample and does not average out in the
 /// estimate as noise does; it counts a hundredfold.
-///
-/// The spectrum is that of the first difference (which has no trend to leak), divided by the
-/// difference's own.
 pub fn aperiodic(q: &[f64], rate: f64, order: usize) -> Cutoff {
-    let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
     // a tenth of a hertz to resolve the motion, and at least four windows to average
     let length = ((10.0 * rate) as usize).clamp(64, (q.len() / 2).max(64));
-    let (f, mut density) = welch(&difference, rate, length);
-    for (f, d) in f.iter().zip(&mut density) {
-        let gain = 2.0 * (PI * f / rate).sin();
-        *d /= (gain * gain).max(1e-300);
-    }
-    density[0] = 0.0;
+    let (f, density) = spectrum_of(q, rate, length);
     let largest = density.iter().cloned().fold(0.0, f64::max);
     let floor = noise_floor(&f, &density, rate).max(ROUNDING * largest);
     // a line of noise here and there is no signal: means over neighbours decide

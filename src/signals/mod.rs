@@ -115,6 +115,9 @@ pub struct Prepared {
     pub periods: Option<Periods>,
     /// cut-off of the positions of each coordinate, Hz; infinite where they were taken as they are
     pub position_cutoff: Vec<f64>,
+    /// standard deviation of the velocity of each actuator, from the noise floor of its positions (of
+    /// its measured velocities, where those are used), rad/s or m/s
+    pub velocity_noise: Vec<f64>,
     /// why the cut-offs are what they are, in words
     pub cutoff_reason: String,
     /// the filter that torque and regressor pass

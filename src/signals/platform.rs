@@ -1,5 +1,6 @@
 //! Coordinates of a parallel robot from the positions of its actuators, sample by sample.
 
+use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::mechanism::task::{from_quaternion, rpy};
 use crate::mechanism::{Mechanism, Task};
@@ -49,6 +50,62 @@ pub fn forward(mechanism: &Mechanism, q: &[Vec<f64>]) -> Result<Vec<f64>> {
         }
     }
     Ok(x)
+}
+
+/// Measured rates of the coordinates, one list each.
+#[derive(Debug, Clone)]
+pub struct Rates {
+    /// velocities
+    pub velocity: Vec<Vec<f64>>,
+    /// accelerations, where they were measured
+    pub acceleration: Option<Vec<Vec<f64>>>,
+}
+
+/// Velocities of the coordinates, and accelerations where there are any, from measured ones of the
+/// actuators along the positions `x`; one list a coordinate or actuator:
+///
+/// ```text
+/// ẋ = D_a⁺ q̇_a        ẍ = D_a⁺ (q̈_a − F_a,xx[ẋ, ẋ])
+/// ```
+///
+/// # Errors
+/// A pose that cannot be reached.
+pub fn rates(
+    mechanism: &Mechanism,
+    x: &[Vec<f64>],
+    dq: &[Vec<f64>],
+    ddq: Option<&[Vec<f64>]>,
+) -> Result<Rates> {
+    let (m, n) = (x.len(), mechanism.actuators());
+    let mut samples = Samples::zeros(m, x.first().map_or(0, Vec::len));
+    let count = samples.count;
+    samples.q = x.concat();
+    // `D_a⁺`, the same for both: it depends on the positions alone
+    let inverse = mechanism.motion(&samples)?.a;
+    let through = |of: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+        let one = |k: usize, s: usize| -> f64 {
+            let terms = (0..n).map(|a| inverse[(k * n + a) * count + s] * of(a, s));
+            terms.sum()
+        };
+        (0..m)
+            .map(|k| (0..count).map(|s| one(k, s)).collect())
+            .collect()
+    };
+    let xd = through(&|a, s| dq[a][s]);
+    let Some(ddq) = ddq else {
+        return Ok(Rates {
+            velocity: xd,
+            acceleration: None,
+        });
+    };
+    samples.qd = xd.concat();
+    let bend = mechanism.motion(&samples)?.tree.qdd;
+    let at = |a: usize, s: usize| bend[mechanism.actuated[a] * count + s];
+    let xdd = through(&|a, s| ddq[a][s] - at(a, s));
+    Ok(Rates {
+        velocity: xd,
+        acceleration: Some(xdd),
+    })
 }
 
 /// Task coordinates from measured pose columns `x y z qw qx qy qz`.

@@ -73,9 +73,9 @@ impl Prepared {
     fn aperiodic(record: &Record, plant: &Plant, settings: &Settings) -> Result<Prepared> {
         let rate = record.rate();
         let x = coordinates(record, plant, settings)?;
-        let serial = plant.mechanism().is_none() && settings.measured_rates;
-        let dq = record.dq.as_ref().filter(|_| serial);
-        let ddq = record.ddq.as_ref().filter(|_| serial);
+        let measured = measured_rates(record, plant, settings, &x)?;
+        let dq = measured.as_ref().map(|m| &m.velocity);
+        let ddq = measured.as_ref().and_then(|m| m.acceleration.as_ref());
         let series: Vec<(f64, Rates)> = x
             .par_iter()
             .enumerate()
@@ -120,6 +120,18 @@ impl Prepared {
         };
         let mut valid = record.valid.clone();
         let frequencies: Vec<f64> = series.iter().map(|s| s.0).collect();
+        let highest = frequencies.iter().cloned().fold(0.0, f64::max);
+        let noise_of = |q: &Vec<f64>| {
+            let floor = cutoff::floor(q, rate);
+            cutoff::velocity_noise(floor, highest.min(0.5 * rate))
+        };
+        let velocity_noise = match dq.and(record.dq.as_ref()) {
+            // as measured, at most up to half the rate
+            Some(dq) => (dq.iter())
+                .map(|v| (cutoff::floor(v, rate) * highest.min(0.5 * rate)).sqrt())
+                .collect(),
+            None => record.q.iter().map(noise_of).collect(),
+        };
         // the ends of a smoothed record are continued, not measured
         let lowest = frequencies.iter().cloned().fold(f64::INFINITY, f64::min);
         if lowest.is_finite() {
@@ -139,6 +151,7 @@ impl Prepared {
                 actuators: record.actuators(),
                 valid,
                 periods: None,
+                velocity_noise,
                 position_cutoff: frequencies,
                 cutoff_reason: reason.into(),
                 filter: Decimator::new(f64::INFINITY, rate, &[], false),
@@ -156,6 +169,13 @@ impl Prepared {
         count: usize,
     ) -> Result<Prepared> {
         let mut warnings = Vec::new();
+        if record.dq.is_some() && settings.measured_rates {
+            warnings.push(Warning::new(
+                record.path.display().to_string(),
+                "its measured velocities (dq1…) were not used: the mean of the periods is differentiated in \
+                 the frequency domain; without `period` in the experiment the record is taken as it is, with them",
+            ));
+        }
         let rate = record.rate();
         let period = samples as f64 * record.step;
         // from the end backwards: what is left over is the transient at the beginning
@@ -218,6 +238,13 @@ impl Prepared {
         };
         let places: Vec<&[f64]> = position.iter().map(Vec::as_slice).collect();
         let noise = scatter(&position, &mean(&places), n, samples);
+        let position_cutoff: Vec<f64> = series.iter().map(|s| s.0).collect();
+        let highest = position_cutoff.iter().cloned().fold(0.0, f64::max);
+        // white noise of the mean period
+        let density = |a: usize| 2.0 * noise[(a, a)] / (rate * count as f64);
+        let velocity_noise = (0..n)
+            .map(|a| cutoff::velocity_noise(density(a), highest))
+            .collect();
         let reason = match settings.position_cutoff {
             Some(_) => "as asked for",
             None => {
@@ -230,7 +257,8 @@ impl Prepared {
                 purpose: record.purpose,
                 rate,
                 time: (0..samples).map(|i| i as f64 * record.step).collect(),
-                position_cutoff: series.iter().map(|s| s.0).collect(),
+                position_cutoff,
+                velocity_noise,
                 motion: assemble(series.into_iter().map(|s| s.1).collect()),
                 torque: if has_torque { average } else { Vec::new() },
                 actuators: n,
@@ -297,6 +325,26 @@ fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
         )));
     }
     Ok(p)
+}
+
+/// Velocities and accelerations of the coordinates where the log has those of the actuators and they
+/// are wanted.
+fn measured_rates(
+    record: &Record,
+    plant: &Plant,
+    settings: &Settings,
+    x: &[Vec<f64>],
+) -> Result<Option<platform::Rates>> {
+    let Some(dq) = record.dq.as_ref().filter(|_| settings.measured_rates) else {
+        return Ok(None);
+    };
+    let Some(mechanism) = plant.mechanism() else {
+        return Ok(Some(platform::Rates {
+            velocity: dq.clone(),
+            acceleration: record.ddq.clone(),
+        }));
+    };
+    platform::rates(mechanism, x, dq, record.ddq.as_deref()).map(Some)
 }
 
 /// Coordinates over the whole record.

@@ -2,6 +2,7 @@
 
 use super::{Effects, Run};
 use crate::error::{Error, Result, Warning};
+use crate::log::{Payload, Purpose, Record};
 use crate::output::write_atomic;
 use crate::plant::Plant;
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -110,6 +111,36 @@ pub fn measure(run: &Run, sensors: &Sensors, effects: &Effects, seed: u64) -> Me
         }
     }
     Measured { q, tau }
+}
+
+/// A measured run as the record that reading its log gives, without a file: `t`, `q`, `tau` and
+/// `qref`; `period` is that of the motion, s.
+///
+/// # Panics
+/// If the run has fewer than two samples.
+pub fn to_record(run: &Run, measured: &Measured, purpose: Purpose, period: f64) -> Record {
+    let count = run.t.len();
+    let rows = |list: &[f64]| list.chunks_exact(count).map(<[f64]>::to_vec).collect();
+    Record {
+        name: format!("{purpose:?}").to_lowercase(),
+        path: "simulated".into(),
+        purpose,
+        period: Some(period),
+        payload: Payload::None,
+        step: run.t[1] - run.t[0],
+        t: run.t.clone(),
+        valid: vec![true; count],
+        q: rows(&measured.q),
+        tau: rows(&measured.tau),
+        qref: Some(rows(&run.reference)),
+        dq: None,
+        ddq: None,
+        ql: None,
+        pose: None,
+        pressures: None,
+        resampled: false,
+        warnings: Vec::new(),
+    }
 }
 
 /// Which columns a log has beside `t`, `q`, `tau` and `qref`.

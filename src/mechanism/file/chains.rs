@@ -67,6 +67,7 @@ struct ChainsEntry {
     zero: Option<Spanned<f64>>,
     arm: Option<BodyEntry>,
     rod: Option<BodyEntry>,
+    rods: Option<Spanned<Vec<BodyEntry>>>,
 }
 
 /// One `[[chain]]`; what it leaves out is that of `[chains]`.
@@ -277,7 +278,12 @@ impl Chains<'_> {
         let mut rod = |entry: &BodyEntry, side: &str| {
             entry.inertia(source, &format!("{what}: rod {side}"), warnings)
         };
-        let rods = match (&own.rods, own.rod.as_ref().or(all.rod.as_ref())) {
+        // two bodies or one for both; what the chain states itself comes first
+        let (pair, both) = match own.rods.is_some() || own.rod.is_some() {
+            true => (&own.rods, &own.rod),
+            false => (&all.rods, &all.rod),
+        };
+        let rods = match (pair, both) {
             (Some(pair), _) => match &pair.get_ref()[..] {
                 [a, b] => [rod(a, "a")?, rod(b, "b")?],
                 _ => {

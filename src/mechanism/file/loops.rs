@@ -286,7 +286,9 @@ pub(super) fn read(source: Text, folder: &Path) -> Result<Mechanism> {
         head.shared(&mut robot.joints[a], &mut warnings)?;
     }
     let stated: Vec<&str> = (file.joint.iter())
-        .map(|j| j.get_ref().name.get_ref().as_str())
+        .map(|j| j.get_ref())
+        .filter(|j| j.position.is_some())
+        .map(|j| j.name.get_ref().as_str())
         .collect();
     let stated: Vec<bool> = (robot.joints.iter())
         .map(|j| stated.contains(&j.name.as_str()))

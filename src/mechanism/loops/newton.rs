@@ -12,7 +12,7 @@
 //! None of these tensors is formed: `Φ` along Taylor series in time with a dual part in the
 //! direction `Dw` gives the brackets as coefficients, from which the one unknown is solved.
 
-use super::closure::Chain;
+use super::closure::{Chain, Closure};
 use crate::dynamics::Samples;
 use crate::dynamics::lanes::Isa;
 use crate::mechanism::geometry::{Geometry, Segment};
@@ -319,6 +319,9 @@ impl Geometry for Closing {
     }
     fn task_joints(&self) -> Option<&[usize]> {
         Some(&self.independent)
+    }
+    fn closures(&self) -> &[Closure] {
+        &self.chain.closures
     }
     fn sequential(&self) -> bool {
         true

@@ -14,7 +14,7 @@ pub(crate) struct JointEntry {
     /// empty where it is missing, so that the same entry can state what all joints share
     #[serde(default = "nameless")]
     pub(crate) name: Spanned<String>,
-    position: Option<Spanned<Vec<f64>>>,
+    pub(crate) position: Option<Spanned<Vec<f64>>>,
     velocity: Option<Spanned<f64>>,
     acceleration: Option<Spanned<f64>>,
     jerk: Option<Spanned<f64>>,

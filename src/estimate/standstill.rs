@@ -1,0 +1,77 @@
+//! Equations of joints that stand still.
+//!
+//! The torque of a joint at rest differs from that of the rigid bodies by any friction up to the break-away
+//! value, while the column of Coulomb friction takes the sign of what little velocity the noise of the
+//! position makes. Neither is information. Where a joint with Coulomb friction is slower than three standard
+//! deviations of its velocity, or than a thousandth of its fastest, for more than half of what the filter
+//! sees, its equation is left out; those of the other joints stay. A reversal passes in less and is kept.
+
+use super::stack::Stack;
+use crate::error::{Result, Warning};
+use crate::plant::Plant;
+use crate::robot::JointTerm;
+use crate::signals::Prepared;
+
+/// Standard deviations of the velocity within which a joint may stand still.
+const SIGMAS: f64 = 3.0;
+/// Fraction of its fastest velocity below which a joint counts as standing.
+const SLOW: f64 = 1e-3;
+
+/// The fit records without the equations of joints that stand still, and what was left out; `None` where
+/// there is nothing to leave out.
+///
+/// # Errors
+/// A pose of a parallel robot that cannot be reached.
+pub fn left_out(
+    plant: &Plant,
+    fit: &[&Stack],
+    prepared: &[&Prepared],
+) -> Result<(Option<Vec<Stack>>, Option<Warning>)> {
+    let joints = plant.actuators();
+    let coulomb = JointTerm::Coulomb as usize;
+    let dry: Vec<usize> = (0..joints.len())
+        .filter(|&a| joints[a].identify[coulomb] || joints[a].terms[coulomb] != 0.0)
+        .collect();
+    if dry.is_empty() {
+        return Ok((None, None));
+    }
+    let mut out: Vec<Stack> = fit.iter().map(|s| (*s).clone()).collect();
+    for (s, p) in out.iter_mut().zip(prepared) {
+        let qd = plant.actuator_motion(&p.motion)?.qd;
+        for &a in &dry {
+            let v = &qd[a * p.count()..(a + 1) * p.count()];
+            let fastest = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+            let least = (SIGMAS * p.velocity_noise[a]).max(SLOW * fastest);
+            let still: Vec<f64> = v.iter().map(|x| f64::from(x.abs() <= least)).collect();
+            if still.iter().all(|x| *x == 0.0) {
+                continue;
+            }
+            for (k, share) in p.filter.apply(&still).into_iter().enumerate() {
+                if share > 0.5 {
+                    s.leave_out(a, k);
+                }
+            }
+        }
+    }
+    let named: Vec<String> = dry
+        .iter()
+        .filter_map(|&a| {
+            let all: usize = out.iter().map(|s| s.count).sum();
+            let used: usize = out.iter().map(|s| s.used(a)).sum();
+            let percent = 100.0 * (all - used) as f64 / all as f64;
+            (used < all).then(|| format!("{} {percent:.1} %", joints[a].name))
+        })
+        .collect();
+    if named.is_empty() {
+        return Ok((None, None));
+    }
+    let note = Warning::new(
+        "standstill",
+        format!(
+            "equations of joints that stand still were left out of the fit, because friction at rest can have any \
+             value up to Coulomb's: {}",
+            named.join(", ")
+        ),
+    );
+    Ok((Some(out), Some(note)))
+}
