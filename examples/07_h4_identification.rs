@@ -90,6 +90,7 @@ fn record(
     let motion = design_plant(nominal, &settings, &AtomicBool::new(false), &|_| {})?.trajectory;
     let settings = Simulation {
         seed,
+        step: 1e-3,
         ..Simulation::default()
     };
     let run = simulate(truth, &motion.fourier, periods, &settings, &|_| {})?;
