@@ -12,6 +12,7 @@
 //! | effects | [`catalogue`] | columns of every effect at every place |
 //! | search | [`search`], [`verdict`] | sets of effects, rivals, confidence |
 //! | gap | [`gap`] | residuals against noise: joints, odd, even, non-periodic |
+//! | simulation | [`forward`] | the robot simulated under the recorded torques, before and after |
 //! | next | [`next`] | the motion that tells rivals apart |
 //! | output | [`json`], [`page`], [`improve`] | `diagnosis.json`, report, improved robot |
 //!
@@ -21,6 +22,7 @@ pub mod catalogue;
 pub mod closed;
 pub mod data;
 pub mod evidence;
+pub mod forward;
 pub mod gap;
 pub mod improve;
 pub mod json;
@@ -178,6 +180,8 @@ pub struct Diagnosis {
     pub phi: Vec<f64>,
     /// proposal for the next experiment
     pub next: Option<next::Proposal>,
+    /// the robot simulated under the recorded torques, before and after
+    pub forward: forward::Forward,
     /// warnings
     pub warnings: Vec<Warning>,
     /// threshold and scale: penalty of the prior before and after
@@ -431,6 +435,9 @@ pub fn of_logs(
     findings.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
 
     let records = record_gaps(&data, &frozen, &refit, &after);
+    progress("forward simulation");
+    let added = forward::effects_torque(&cx, &effects, &decision.members);
+    let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added);
     let untestable = untestable(&data, &list, &effects);
     let fitted = |r: &Record| r.fit;
     let noise_source = match data.noise[0].source {
@@ -463,6 +470,7 @@ pub fn of_logs(
         untestable,
         phi: phi_after[..plant.parameters().len()].to_vec(),
         next,
+        forward,
         warnings: Vec::new(),
         surprise: decision.surprise,
         window: data.window,
