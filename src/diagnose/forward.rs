@@ -10,8 +10,8 @@
 //! ```
 //!
 //! all of it at `x_m + e`. A model that is right stays on the recorded motion; a torque `r` that it
-//! lacks moves it by about `r / (M ω²)` where it changes slower than `ω` and by `r / (M ω_r²)` where
-//! it changes faster, at `ω_r`. The step is implicit in the velocity (Moreau 1988), one a sample; dry
+//! lacks moves it by about `r / (M ω²)` where it changes slower than `ω`, by less where it changes
+//! faster. The step is implicit in the velocity (Moreau 1988), one a sample; dry
 //! friction is set-valued, from the same quadratic program as in [`simulate`](crate::simulate).
 //!
 //! Effects act as the torque that their columns give along the recorded motion, not along the
@@ -31,7 +31,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Natural frequency of the spring that holds the robot to the recorded motion, Hz.
-pub const BANDWIDTH: f64 = 0.5;
+pub const BANDWIDTH: f64 = 2.0;
 /// Longest part of a record that is simulated, s.
 pub const LONGEST: f64 = 20.0;
 /// The models, in the order of every array of three.

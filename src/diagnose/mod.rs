@@ -11,6 +11,7 @@
 //! | nominal | [`data`], [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
 //! | search | [`search`], [`verdict`] | sets of effects, rivals, confidence |
+//! | intervals | [`interval`] | how sure the share is that an effect explains |
 //! | gap | [`gap`] | residuals against noise: joints, odd, even, non-periodic |
 //! | simulation | [`forward`] | the robot simulated under the recorded torques, before and after |
 //! | next | [`next`] | the motion that tells rivals apart |
@@ -25,6 +26,7 @@ pub mod evidence;
 pub mod forward;
 pub mod gap;
 pub mod improve;
+pub mod interval;
 pub mod json;
 pub mod next;
 pub mod noise;
@@ -364,8 +366,20 @@ pub fn of_logs(
         })
         .collect();
 
+    let scatter = |set: &[&Projected]| -> Vec<Vec<f64>> {
+        evidence.unwhitened(&evidence.residual(set, &evidence.fit(set)))
+    };
+    let (all, gap) = (scatter(&members), scatter(&[]));
     let mut findings = Vec::new();
-    for m in &decision.members {
+    for (i, m) in decision.members.iter().enumerate() {
+        let mut rest = members.clone();
+        rest.remove(i);
+        let total = match m.frozen {
+            true => &evidence.unwhitened(&evidence.r),
+            false => &gap,
+        };
+        let without = scatter(&rest);
+        let interval = interval::explained(&data, total, &without, &all, m.explains, settings.seed);
         let c = &m.candidate;
         let effect = effects[c.effect].as_ref();
         let card = effect.card();
@@ -387,7 +401,7 @@ pub fn of_logs(
             eta: c.eta.clone(),
             confidence: m.confidence,
             explains: m.explains,
-            interval: m.interval,
+            interval,
             holdout: m.holdout,
             visibility: m.visibility,
             values: effect.values(&cx, &c.place, &c.shape, &c.eta, &m.std),
