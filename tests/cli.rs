@@ -391,3 +391,59 @@ fn every_command_has_help_with_an_example() {
         );
     }
 }
+
+#[test]
+fn diagnostic_motions_keep_the_limits_and_wait_for_logs() {
+    let t = Test::new();
+    let line = "design planar2 --diagnostic --starts 1 --harmonics 3 --period 4 --rate 50 --derate 0.8 --output set";
+    let out = t.run(line);
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let report = t.json("set/report.json");
+    let motions = report["motions"].as_array().unwrap();
+    let of = |k: usize, key: &str| motions[k][key].as_f64().unwrap();
+    assert_eq!(motions.len(), 4);
+    for m in motions {
+        assert_eq!(m["limits"]["satisfied"], true, "{m}");
+        assert!(
+            m["limits"]["worst"]["used"].as_f64().unwrap() <= 0.8 + 1e-9,
+            "{m}"
+        );
+        assert_eq!(m["periods"], 3);
+        let file = t.json(&format!("set/{}", m["file"].as_str().unwrap()));
+        let lines = file["harmonics"].as_array().unwrap();
+        assert!(lines.iter().all(|h| h.as_u64().unwrap() % 2 == 1), "{m}");
+    }
+    assert!(of(1, "period") > 1.4 * of(0, "period"));
+    assert!(of(2, "reversals") > of(0, "reversals"));
+    // each motion simulated and logged under the name that the experiment waits for
+    for name in ["trajectory", "slow", "reversals", "holdout"] {
+        let out = t.run(&format!(
+            "simulate planar2 set/{name}.json --rate 100 --output set/{name}_log.csv"
+        ));
+        assert_eq!(out.status, 0, "{}", out.stderr);
+    }
+    let out = t.run("diagnose set/experiment.toml --no-next --output gap --json");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let diagnosis: serde_json::Value = serde_json::from_str(&out.stdout).unwrap();
+    assert_eq!(diagnosis["records"].as_array().unwrap().len(), 4);
+    let simulated = &diagnosis["forward_simulation"];
+    assert_eq!(simulated["records"][0]["record"], "holdout_log");
+    assert!(
+        simulated["records"][0]["joints"][1]["improved"]
+            .as_f64()
+            .is_some()
+    );
+    assert_eq!(simulated["not_simulated"], serde_json::json!([]));
+    // a set is made whole or not at all, and not from what contradicts it
+    t.fails(line, 1, &["exists"]);
+    t.fails(
+        "design planar2 --diagnostic --periods 2 --output b",
+        2,
+        &["at least 3"],
+    );
+    t.fails(
+        "design planar2 --diagnostic --grid full --output b",
+        2,
+        &["--grid"],
+    );
+}

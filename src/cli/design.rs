@@ -1,16 +1,19 @@
 //! `excite design ROBOT`.
 
+mod diagnostic;
+
 use super::{load, pretty, print, summary::summary, warn, write};
+use excite::design::diagnostic::PERIODS;
 use excite::design::{Condition, Criterion, Progress, Settings, design_plant};
 use excite::dynamics::Tree;
 use excite::identifiability::Assessment;
 use excite::output::prepare_dir;
 use excite::report::before;
 use excite::trajectory::samples::write_samples;
-use excite::trajectory::{Ends, Grid};
+use excite::trajectory::{Ends, Grid, Trajectory};
 use excite::{Error, Plant, Result};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -26,7 +29,7 @@ use std::time::Instant;
                   trajectory found so far.",
     after_help = "Examples:\n  excite design panda --output out\n  excite design hexapod --output out\n  excite design robot.toml --harmonics 7 \
                   --period 20 --derate 0.8 --time-limit 60\n  excite design arm.urdf --criterion d \
-                  --identify armature,viscous,coulomb"
+                  --identify armature,viscous,coulomb\n  excite design robot.toml --diagnostic --output diagnostic"
 )]
 pub struct Args {
     /// Bundled robot, robot.toml or URDF
@@ -43,12 +46,17 @@ pub struct Args {
     /// Period in seconds
     #[arg(long, default_value_t = 10.0, allow_negative_numbers = true)]
     period: f64,
-    /// Periods of the experiment
-    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    periods: u32,
+    /// Periods of the experiment [default: 1; 3 with --diagnostic, which wants at least so many]
+    #[arg(long, allow_negative_numbers = true)]
+    periods: Option<u32>,
     /// Harmonics used: full (1, 2, 3, …), odd, or random-odd (odd with one in four left out)
     #[arg(long, default_value = "full")]
     grid: Grid,
+    /// Also make the motions that `excite diagnose` wants, all of odd harmonics: slow.json (the same
+    /// path slower), reversals.json, holdout.json, their samples, and an experiment.toml that waits
+    /// for the logs
+    #[arg(long, conflicts_with = "grid")]
+    diagnostic: bool,
     /// Ends: rest (zero velocity and acceleration) or free
     #[arg(long, default_value = "rest")]
     ends: Ends,
@@ -105,8 +113,11 @@ pub fn run(args: Args) -> Result<()> {
     let settings = Settings {
         harmonics: args.harmonics,
         period: args.period,
-        periods: args.periods,
-        grid: args.grid,
+        periods: periods(args.periods, args.diagnostic)?,
+        grid: match args.diagnostic {
+            true => Grid::Odd,
+            false => args.grid,
+        },
         ends: args.ends,
         start: args.start,
         criterion: args.criterion,
@@ -128,12 +139,15 @@ pub fn run(args: Args) -> Result<()> {
             args.rate
         )));
     }
-    let names = [
+    let mut names = vec![
         "trajectory.json",
         "samples.csv",
         "report.json",
         "report.html",
     ];
+    if args.diagnostic {
+        names.extend(diagnostic::FILES);
+    }
     let files = prepare_dir(&args.output, &names, args.force)?;
 
     let interrupt = Arc::new(AtomicBool::new(false));
@@ -167,29 +181,20 @@ pub fn run(args: Args) -> Result<()> {
     let assessment = Assessment::with_plant(&plant, &result.trajectory)?;
     warn(&assessment.warnings);
     result.trajectory.write(&files[0], args.force)?;
-    let fourier = &result.trajectory.fourier;
-    match &plant {
-        Plant::Serial(robot) => {
-            let tree = Tree::new(robot);
-            let torque = excite::regressor::torque_function(robot, &tree);
-            write_samples(
-                &files[1],
-                args.force,
-                fourier,
-                settings.periods,
-                args.rate,
-                Some(&torque),
-            )?;
-        }
-        Plant::Parallel(mechanism) => {
-            mechanism.write_motion(&files[1], args.force, fourier, settings.periods, args.rate)?;
-        }
-    }
-    let json = before::json(
+    samples(&plant, &result.trajectory, &files[1], args.force, args.rate)?;
+    let set = match args.diagnostic {
+        true => diagnostic::Set::new(&plant, &result.trajectory, &settings)?,
+        false => diagnostic::Set::default(),
+    };
+    set.write(&plant, &args.robot, &args.output, args.force, args.rate)?;
+    let mut json = before::json(
         &assessment,
         Some(&result.record),
         begin.elapsed().as_secs_f64(),
     );
+    if args.diagnostic {
+        json["motions"] = set.json();
+    }
     write(&files[2], args.force, &pretty(&json))?;
     write(
         &files[3],
@@ -198,8 +203,46 @@ pub fn run(args: Args) -> Result<()> {
     )?;
     match args.json {
         true => print(&pretty(&json)),
-        false => print(&summary(&assessment, Some(&result.record), &files)),
+        false => {
+            let summary = summary(&assessment, Some(&result.record), &files);
+            print(&format!("{summary}{}", set.summary()))
+        }
     }
+}
+
+/// Periods of the motion; a diagnosis wants at least three.
+fn periods(asked: Option<u32>, diagnostic: bool) -> Result<u32> {
+    match (asked, diagnostic) {
+        (None, false) => Ok(1),
+        (None, true) => Ok(PERIODS),
+        (Some(n), true) if n < PERIODS => Err(Error::Argument(format!(
+            "--diagnostic wants at least {PERIODS} periods, not {n}: noise is told from the gap by \
+             what repeats"
+        ))),
+        (Some(n), _) => Ok(n),
+    }
+}
+
+/// Writes the samples of a motion.
+fn samples(
+    plant: &Plant,
+    trajectory: &Trajectory,
+    path: &Path,
+    force: bool,
+    rate: f64,
+) -> Result<()> {
+    let (fourier, periods) = (&trajectory.fourier, trajectory.periods);
+    match plant {
+        Plant::Serial(robot) => {
+            let tree = Tree::new(robot);
+            let torque = excite::regressor::torque_function(robot, &tree);
+            write_samples(path, force, fourier, periods, rate, Some(&torque))?;
+        }
+        Plant::Parallel(mechanism) => {
+            mechanism.write_motion(path, force, fourier, periods, rate)?;
+        }
+    }
+    Ok(())
 }
 
 fn bar(settings: &Settings) -> ProgressBar {

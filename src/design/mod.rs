@@ -16,6 +16,7 @@
 mod closed;
 mod closed_limits;
 pub mod criterion;
+pub mod diagnostic;
 pub mod information;
 pub mod limits;
 pub mod path;

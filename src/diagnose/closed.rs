@@ -7,17 +7,23 @@ use crate::mechanism::Mechanism;
 /// Task coordinates at every sample, by forward kinematics from the home pose onwards; velocities
 /// and accelerations from `ẋ = D_a⁺ q̇_a` through central differences of the pose, which is as smooth
 /// as the actuator motion it comes from.
+/// Of a motion that repeats after `cycle` samples one period is solved.
 ///
 /// # Errors
 /// Actuator positions that no pose near the one before gives.
-pub fn coordinates(mechanism: &Mechanism, actuators: &Samples) -> Result<Samples> {
-    let (m, n, count) = (mechanism.freedoms(), actuators.dof, actuators.count);
+pub fn coordinates(
+    mechanism: &Mechanism,
+    actuators: &Samples,
+    cycle: Option<usize>,
+) -> Result<Samples> {
+    let (m, n) = (mechanism.freedoms(), actuators.dof);
+    let count = cycle.unwrap_or(actuators.count);
     let mut out = Samples::zeros(m, count);
     let mut from = mechanism.home.clone();
     let mut q = vec![0.0; n];
     for i in 0..count {
         for (j, q) in q.iter_mut().enumerate() {
-            *q = actuators.q[j * count + i];
+            *q = actuators.q[j * actuators.count + i];
         }
         from = mechanism.forward(&q, &from)?.x;
         for (k, x) in from.iter().enumerate() {
@@ -42,5 +48,19 @@ pub fn coordinates(mechanism: &Mechanism, actuators: &Samples) -> Result<Samples
             out.qdd[k * count + i] = (sides[1][k] - 2.0 * here[k] + sides[0][k]) / (H * H);
         }
     }
-    Ok(out)
+    if count == actuators.count {
+        return Ok(out);
+    }
+    let repeated = |rows: &[f64]| -> Vec<f64> {
+        let row =
+            |r: &[f64]| -> Vec<f64> { r.iter().copied().cycle().take(actuators.count).collect() };
+        rows.chunks_exact(count).flat_map(row).collect()
+    };
+    Ok(Samples {
+        dof: m,
+        count: actuators.count,
+        q: repeated(&out.q),
+        qd: repeated(&out.qd),
+        qdd: repeated(&out.qdd),
+    })
 }

@@ -4,9 +4,10 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::noise::{LINES, Noise, between_periods, spectrum};
-use super::record::Record;
+use super::record::{Record, triangle};
 use crate::dynamics::Samples;
 use crate::error::Result;
+use crate::mechanism::Mechanism;
 use crate::plant::{Kind, Parameter, Plant};
 use crate::robot::{JointTerm, Prior};
 use faer::Mat;
@@ -208,8 +209,8 @@ impl<'a> Data<'a> {
             let Some(j) = actuated.iter().position(|a| *a == joint) else {
                 continue;
             };
-            if self.plant.mechanism().is_some() {
-                // the columns of closed chains may share a parameter: left as they are
+            if self.plant.mechanism().is_some_and(redundant) {
+                // friction of one drive acts on others, too: left as it is
                 continue;
             }
             let column = self.own(j, |_, v| sign(v, 1e-3 * self.speed[j]));
@@ -497,16 +498,14 @@ impl<'a> Data<'a> {
     }
 
     /// What a log of any robot may have without being at odds with its model: reversals of friction
-    /// that are not perfectly sharp, and a motion close to them that friction bends faster than
-    /// positions show.
+    /// that are not perfectly sharp, a motion close to them that friction bends faster than
+    /// positions show, and drives of parallel robots that stick there.
     pub fn ordinary(&mut self) {
-        let n = self.joints();
-        if self.plant.mechanism().is_some() {
+        if self.plant.mechanism().is_some_and(redundant) {
             return;
         }
-        let robot = self.plant.robot();
-        for j in 0..n {
-            let coulomb = robot.joints[j].terms[2].abs();
+        for (j, actuator) in self.plant.actuators().into_iter().enumerate() {
+            let coulomb = actuator.terms[2].abs();
             if coulomb == 0.0 {
                 continue;
             }
@@ -517,7 +516,38 @@ impl<'a> Data<'a> {
                 let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
                 self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
             }
+            if self.plant.mechanism().is_some() {
+                let sharp = self.own(j, |_, v| sign(v, sharp));
+                for column in self.sticking(&sharp) {
+                    self.add_nuisance("sticking", &Column::on(j, column), 0.5 * coulomb);
+                }
+            }
         }
+    }
+
+    /// What sticking adds to Coulomb friction `s = sgn q̇`: while a drive stands, its friction is
+    /// whatever the controller's torque leaves to hold, and passes from one side to the other in a
+    /// time of the loop's bandwidth and not of the velocity. With the mean `s̄` over a triangle of
+    /// ± `T`: `s̄ − s` (a slow passage) and `T ds̄/dt` (one that comes early or late).
+    fn sticking(&self, sign: &[f64]) -> Vec<Vec<f64>> {
+        let mut all = Vec::new();
+        for time in [0.01, 0.03] {
+            let mut slow = Vec::with_capacity(sign.len());
+            let mut early = Vec::with_capacity(sign.len());
+            for (k, r) in self.records.iter().enumerate() {
+                let s = &sign[self.span(k)];
+                let half = ((time / r.dt).round() as usize).max(1);
+                let mean = triangle(s, half + 1);
+                slow.extend(mean.iter().zip(s).map(|(m, s)| m - s));
+                let last = mean.len() - 1;
+                early.extend((0..=last).map(|i| {
+                    let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+                    (mean[b] - mean[a]) / (b - a) as f64 * half as f64
+                }));
+            }
+            all.extend([slow, early]);
+        }
+        all
     }
 
     /// Torque of the nominal model with parameters `phi`, by actuator, over all records.
@@ -620,6 +650,12 @@ pub fn rigid(
             Ok((0..w.nrows()).map(|i| y[i]).collect())
         }
     }
+}
+
+/// Whether a closed chain has more actuators than freedoms: generalised forces of one actuator then
+/// spread over all.
+fn redundant(mechanism: &Mechanism) -> bool {
+    mechanism.actuators() > mechanism.freedoms()
 }
 
 /// Smooth sign.

@@ -1,5 +1,6 @@
 //! `diagnosis.json`.
 
+use super::forward::{BANDWIDTH, MODELS};
 use super::{Diagnosis, Finding};
 use serde_json::{Map, Value, json};
 
@@ -37,6 +38,39 @@ fn finding(f: &Finding) -> Value {
         "seen_in": if f.frozen { "frozen" } else { "refit" },
         "equation": f.equation,
         "separated_by": f.separated_by,
+    })
+}
+
+/// Deviation of the simulated robot from the log.
+fn forward(d: &Diagnosis) -> Value {
+    let f = &d.forward;
+    let records: Vec<Value> = f
+        .records
+        .iter()
+        .map(|r| {
+            let of = |model: usize, j: usize| r.rms[model].as_ref().map(|rms| number(rms[j]));
+            let joints: Vec<Value> = (0..d.joints.len())
+                .map(|j| {
+                    let mut out = json!({ "joint": d.joints[j], "unit": f.units[j] });
+                    for (m, model) in MODELS.into_iter().enumerate() {
+                        out[model] = json!(of(m, j));
+                    }
+                    out
+                })
+                .collect();
+            json!({
+                "record": r.record,
+                "use": if r.fit { "fit" } else { "holdout" },
+                "seconds": number(r.t.last().copied().unwrap_or(0.0)),
+                "joints": joints,
+            })
+        })
+        .collect();
+    json!({
+        "quantity": "rms deviation of the position from the log, driven by the recorded torque and held by a soft spring",
+        "bandwidth": BANDWIDTH,
+        "records": records,
+        "not_simulated": f.failed,
     })
 }
 
@@ -106,6 +140,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         "untestable": d.untestable.iter().map(|(effect, place, v)| json!({
             "effect": effect, "joints": place, "visibility": number(*v),
         })).collect::<Vec<_>>(),
+        "forward_simulation": forward(d),
         "prior_surprise": numbers(&d.surprise),
         "torque_window": number(d.window),
         "warnings": d.warnings,

@@ -11,7 +11,9 @@
 //! | nominal | [`data`], [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
 //! | search | [`search`], [`verdict`] | sets of effects, rivals, confidence |
+//! | intervals | [`interval`] | how sure the share is that an effect explains |
 //! | gap | [`gap`] | residuals against noise: joints, odd, even, non-periodic |
+//! | simulation | [`forward`] | the robot simulated under the recorded torques, before and after |
 //! | next | [`next`] | the motion that tells rivals apart |
 //! | output | [`json`], [`page`], [`improve`] | `diagnosis.json`, report, improved robot |
 //!
@@ -21,8 +23,10 @@ pub mod catalogue;
 pub mod closed;
 pub mod data;
 pub mod evidence;
+pub mod forward;
 pub mod gap;
 pub mod improve;
+pub mod interval;
 pub mod json;
 pub mod next;
 pub mod noise;
@@ -178,6 +182,8 @@ pub struct Diagnosis {
     pub phi: Vec<f64>,
     /// proposal for the next experiment
     pub next: Option<next::Proposal>,
+    /// the robot simulated under the recorded torques, before and after
+    pub forward: forward::Forward,
     /// warnings
     pub warnings: Vec<Warning>,
     /// threshold and scale: penalty of the prior before and after
@@ -360,8 +366,20 @@ pub fn of_logs(
         })
         .collect();
 
+    let scatter = |set: &[&Projected]| -> Vec<Vec<f64>> {
+        evidence.unwhitened(&evidence.residual(set, &evidence.fit(set)))
+    };
+    let (all, gap) = (scatter(&members), scatter(&[]));
     let mut findings = Vec::new();
-    for m in &decision.members {
+    for (i, m) in decision.members.iter().enumerate() {
+        let mut rest = members.clone();
+        rest.remove(i);
+        let total = match m.frozen {
+            true => &evidence.unwhitened(&evidence.r),
+            false => &gap,
+        };
+        let without = scatter(&rest);
+        let interval = interval::explained(&data, total, &without, &all, m.explains, settings.seed);
         let c = &m.candidate;
         let effect = effects[c.effect].as_ref();
         let card = effect.card();
@@ -383,7 +401,7 @@ pub fn of_logs(
             eta: c.eta.clone(),
             confidence: m.confidence,
             explains: m.explains,
-            interval: m.interval,
+            interval,
             holdout: m.holdout,
             visibility: m.visibility,
             values: effect.values(&cx, &c.place, &c.shape, &c.eta, &m.std),
@@ -431,6 +449,9 @@ pub fn of_logs(
     findings.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
 
     let records = record_gaps(&data, &frozen, &refit, &after);
+    progress("forward simulation");
+    let added = forward::effects_torque(&cx, &effects, &decision.members);
+    let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added);
     let untestable = untestable(&data, &list, &effects);
     let fitted = |r: &Record| r.fit;
     let noise_source = match data.noise[0].source {
@@ -463,6 +484,7 @@ pub fn of_logs(
         untestable,
         phi: phi_after[..plant.parameters().len()].to_vec(),
         next,
+        forward,
         warnings: Vec::new(),
         surprise: decision.surprise,
         window: data.window,

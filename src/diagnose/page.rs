@@ -73,6 +73,7 @@ pub fn html(d: &Diagnosis) -> String {
         Section::new("Over velocity, position, torque and time", maps(d)),
         Section::new("Over frequency", spectra(d)),
         Section::new("How far it shrinks", shrink(d)),
+        Section::new("As the simulator's user sees it", simulated(d)),
         Section::new("What to run next", next(d)),
         Section::new("What this data cannot say", limits(d)),
     ];
@@ -292,18 +293,15 @@ fn maps(d: &Diagnosis) -> Markup {
         .into_iter()
         .enumerate()
         {
-            let of = if k == 2 { d.units[j] } else { "" };
+            let position = d.forward.units[j];
+            let of = [format!("{position}/s"), position.into(), d.units[j].into()][k].clone();
             panels.push(Panel {
                 title: if k == 0 {
                     d.joints[j].clone()
                 } else {
                     String::new()
                 },
-                x: Axis::linear(if of.is_empty() {
-                    label.to_string()
-                } else {
-                    unit(label, of)
-                }),
+                x: Axis::linear(unit(label, &of)),
                 y: Axis::linear(unit("residual", d.units[j])),
                 series: vec![
                     dots(x, &t.before, Colour::BLUE),
@@ -431,6 +429,84 @@ fn shrink(d: &Diagnosis) -> Markup {
             h3 { "Effect by effect" }
             (table(&["effect", "of the fitted gap", "of the holdout gap", "sum on holdout"], &[], &steps))
         }
+    }
+}
+
+/// Forward simulation of the first record: curves of the joints that stray most, and all rms.
+fn simulated(d: &Diagnosis) -> Markup {
+    let f = &d.forward;
+    let Some(first) = f.records.first() else {
+        return html! { p { "No record was simulated." } };
+    };
+    let colours = [Colour::GREY, Colour::BLUE, Colour::ORANGE];
+    let names = ["nominal", "refitted", "with the effects"];
+    let step = (first.t.len() / 1500).max(1);
+    let panels = worst(d, 3)
+        .into_iter()
+        .map(|j| {
+            let curves = (0..3).filter(|m| !first.deviation[*m].is_empty());
+            let line = |m: usize| {
+                let points = first.t.iter().zip(&first.deviation[m][j]);
+                let points = points.step_by(step).map(|(t, y)| [*t, *y]).collect();
+                Series::line(points, colours[m])
+            };
+            Panel {
+                title: d.joints[j].clone(),
+                x: Axis::linear("time, s"),
+                y: Axis::linear(unit("deviation", f.units[j])),
+                series: curves.map(line).collect(),
+                ..Panel::default()
+            }
+        })
+        .collect();
+    let svg = Figure {
+        description: "deviation of the simulated robot from the log".into(),
+        width: Figure::WIDTH,
+        height: 150.0,
+        columns: d.joints.len().clamp(1, 3),
+        column_titles: Vec::new(),
+        row_titles: Vec::new(),
+        share_x: false,
+        panels,
+    }
+    .svg();
+    let mut rows = Vec::new();
+    for r in &f.records {
+        for j in 0..d.joints.len() {
+            let cell = |m: usize| match &r.rms[m] {
+                Some(rms) => html! { (significant(rms[j], 3)) " " (f.units[j]) },
+                None => html! { "–" },
+            };
+            let shrinks = match (&r.rms[1], &r.rms[2]) {
+                (Some(a), Some(b)) if a[j] > 0.0 => percent(1.0 - b[j] / a[j]),
+                _ => "–".to_string(),
+            };
+            rows.push(vec![
+                html! { (r.record) },
+                html! { (d.joints[j]) },
+                cell(0),
+                cell(1),
+                cell(2),
+                html! { (shrinks) },
+            ]);
+        }
+    }
+    let kind = match first.fit {
+        true => "first fitted record (no record is kept out)",
+        false => "holdout records",
+    };
+    html! {
+        p { "The robot simulated under the recorded torque of the " (kind) ", at most "
+            (significant(super::forward::LONGEST, 2)) " s of each: rms of its deviation from the recorded position. A soft spring \
+            and damper of " (significant(super::forward::BANDWIDTH, 2)) " Hz hold it, for no model stays on a path that is driven by \
+            torque alone; so the figures compare models, and are no tracking errors under the robot's own controller. Effects act as \
+            the torque that they have along the recorded motion." }
+        (figure(svg, html! {
+            (legend(&[0, 1, 2].map(|m| (colours[m], Shape::Line, names[m]))))
+            "The joints with the largest share of the gap in " (first.record) "."
+        }))
+        (table(&["record", "joint", names[0], names[1], names[2], "less than refitted by"], &[0, 1], &rows))
+        @for why in &f.failed { p { "Not simulated: " (why) } }
     }
 }
 

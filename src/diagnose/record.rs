@@ -171,7 +171,7 @@ impl Record {
         let (x, actuators) = match plant.mechanism() {
             None => (motion.clone(), motion),
             Some(mechanism) => {
-                let x = super::closed::coordinates(mechanism, &motion)?;
+                let x = super::closed::coordinates(mechanism, &motion, cycle)?;
                 (x, motion)
             }
         };

@@ -43,8 +43,6 @@ pub struct Member {
     pub together: f64,
     /// share of the gap on fitted records
     pub explains: f64,
-    /// interval of it
-    pub interval: [f64; 2],
     /// share of the gap on holdout records
     pub holdout: f64,
     /// share of the effect's energy that the nominal model cannot absorb
@@ -671,7 +669,6 @@ fn judge(
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
-    let spread = 2.0 * gain.max(0.0).sqrt() / total.max(1.0);
     // what explains next to nothing, or nothing where it was not fitted, is no finding
     let matters = match frozen {
         true => 1.0,
@@ -703,10 +700,6 @@ fn judge(
         confidence: together / (1.0 + against),
         together,
         explains: explains.clamp(0.0, 1.0),
-        interval: [
-            (explains - spread).clamp(0.0, 1.0),
-            (explains + spread).clamp(0.0, 1.0),
-        ],
         holdout: holdout.clamp(-1.0, 1.0),
         visibility: (quad(&c.projected.s) / quad(&c.projected.raw).max(1e-300)).clamp(0.0, 1.0),
         rivals,

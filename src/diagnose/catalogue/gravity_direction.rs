@@ -1,6 +1,10 @@
 //! The base stands inclined: gravity has another direction in its axes.
 
 use super::*;
+use crate::dynamics::Tree;
+use crate::estimate::robot::with_values;
+use crate::mechanism::Mechanism;
+use nalgebra::Vector3;
 
 /// Gravity direction (base tilt).
 pub struct GravityDirection;
@@ -20,15 +24,14 @@ impl Effect for GravityDirection {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() {
-            vec![Vec::new()]
-        } else {
-            Vec::new()
-        }
+    fn places(&self, _cx: &Context) -> Vec<Vec<usize>> {
+        vec![Vec::new()]
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+        if let Some(mechanism) = cx.data.plant.mechanism() {
+            return turned(cx, mechanism).unwrap_or_default();
+        }
         base_compliance::tilted(cx, |r, _, _| {
             [vec![1.0; r.count], vec![0.0; r.count], vec![0.0; r.count]]
         })
@@ -51,4 +54,29 @@ impl Effect for GravityDirection {
             value("tilt_y", eta[1], std[1], "rad"),
         ]
     }
+}
+
+/// Forces of a closed chain at rest under the change of gravity in base axes for tilts of the base
+/// about its `x` and `y`: `δg = −e × g₀`.
+fn turned(cx: &Context, mechanism: &Mechanism) -> Option<Vec<Column>> {
+    let plant = cx.data.plant;
+    let values = &cx.phi[..plant.parameters().len()];
+    let bodies = with_values(plant, values).bodies;
+    let phi: Vec<f64> = bodies.iter().flat_map(|b| b.inertia.0).collect();
+    [Vector3::x(), Vector3::y()]
+        .iter()
+        .map(|axis| {
+            let mut robot = mechanism.robot.clone();
+            robot.gravity = -axis.cross(&robot.gravity);
+            let tree = Tree::new(&robot);
+            projected(cx, |motion| {
+                let mut rest = motion.tree.clone();
+                rest.qd.fill(0.0);
+                rest.qdd.fill(0.0);
+                let mut gamma = vec![0.0; rest.dof * rest.count];
+                tree.inverse_dynamics(&mut Default::default(), &phi, &rest, &mut gamma);
+                gamma
+            })
+        })
+        .collect()
 }

@@ -1,6 +1,7 @@
 //! Legs or forearms of a parallel robot whose inertia the model leaves out.
 
 use super::*;
+use crate::robot::inertia::UNITS;
 
 /// Neglected leg inertia.
 pub struct LegInertia;
@@ -10,7 +11,7 @@ impl Effect for LegInertia {
         Card {
             name: "leg_inertia",
             title: "neglected leg inertia",
-            equation: "Gᵀ Y_leg φ_leg, all legs alike",
+            equation: "Gᵀ Y_leg φ_leg, all legs alike, their parts bodies of revolution",
             source: "Vivas et al. 2003; Codourey 1996",
             aliases: &[],
             separated_by: "large rotations of the platform",
@@ -21,10 +22,9 @@ impl Effect for LegInertia {
     }
 
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        if cx.serial() {
-            Vec::new()
-        } else {
-            vec![Vec::new()]
+        match unknowns(cx).is_empty() {
+            true => Vec::new(),
+            false => vec![Vec::new()],
         }
     }
 
@@ -34,67 +34,97 @@ impl Effect for LegInertia {
 
     fn values(
         &self,
-        _cx: &Context,
+        cx: &Context,
         _place: &[usize],
         _shape: &[f64],
         eta: &[f64],
         std: &[f64],
     ) -> Vec<Value> {
-        let names = [
-            "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
-        ];
-        (0..eta.len().min(10))
-            .map(|k| value(names[k], eta[k], std[k], crate::robot::inertia::UNITS[k]))
+        let unknowns = unknowns(cx);
+        let numbers = eta.iter().zip(std);
+        unknowns
+            .iter()
+            .zip(numbers)
+            .map(|(u, (eta, std))| value(u.name, *eta, *std, u.unit))
             .collect()
     }
 }
 
-/// Columns of one set of inertial parameters for every body that is neither the platform nor stood
-/// for by an unknown of the nominal model.
-fn legs(cx: &Context) -> Option<Vec<Column>> {
-    let mechanism = cx.data.plant.mechanism()?;
-    let known = |body: usize| {
-        cx.data.parameters.iter().any(|p| match p.kind {
-            Kind::Inertial { body: b, .. } => b == body,
-            Kind::Term { .. } => false,
-        })
+/// One inertial parameter that bodies of a kind share.
+struct Unknown {
+    name: &'static str,
+    unit: &'static str,
+    bodies: Vec<usize>,
+    /// places among the ten of a body that are equal
+    parts: &'static [usize],
+}
+
+/// Parts of a leg by the beginning of their name, with the names of `m`, `mz`, `Ixx = Iyy`, `Izz`.
+const KINDS: [(&str, [&str; 4]); 4] = [
+    (
+        "cylinder",
+        ["cylinder_m", "cylinder_mz", "cylinder_Ixx", "cylinder_Izz"],
+    ),
+    ("rod", ["rod_m", "rod_mz", "rod_Ixx", "rod_Izz"]),
+    ("arm", ["arm_m", "arm_mz", "arm_Ixx", "arm_Izz"]),
+    ("bar", ["bar_m", "bar_mz", "bar_Ixx", "bar_Izz"]),
+];
+const REVOLUTION: [&[usize]; 4] = [&[0], &[3], &[4, 7], &[9]];
+
+/// Parameters of the parts of the legs of a hexapod, H4 or Delta that are neither the platform nor stood for by an unknown of
+/// the nominal model; where some have no mass in it, only of those. Crosses of universal joints
+/// count as massless.
+fn unknowns(cx: &Context) -> Vec<Unknown> {
+    // the links of a general closed chain have no common axes
+    let Some(mechanism) = cx.data.plant.mechanism().filter(|m| m.kind != "loops") else {
+        return Vec::new();
     };
-    let moves = |body: usize| {
-        let joint = &mechanism.robot.joints[mechanism.robot.bodies[body].coordinate];
-        !mechanism.task_names.contains(&joint.name)
+    let stands = |body: usize| {
+        cx.data
+            .parameters
+            .iter()
+            .any(|p| matches!(p.kind, Kind::Inertial { body: b, .. } if b == body))
     };
-    let legs: Vec<usize> = (0..mechanism.robot.bodies.len())
-        .filter(|b| moves(*b) && !known(*b))
+    let bodies = &mechanism.robot.bodies;
+    let of = |kind: &str| -> Vec<usize> {
+        let fits = |b: &usize| {
+            let name = &bodies[*b].name;
+            name.starts_with(kind) && !name.ends_with("_cross")
+        };
+        (0..bodies.len()).filter(fits).collect()
+    };
+    // bodies that share their unknowns are known by the first of them
+    let free: Vec<(Vec<usize>, [&'static str; 4])> = KINDS
+        .iter()
+        .map(|(kind, names)| (of(kind), *names))
+        .filter(|(list, _)| !list.is_empty() && !list.iter().any(|b| stands(*b)))
         .collect();
-    if legs.is_empty() {
-        return None;
-    }
-    let n = cx.data.joints();
-    let mut columns = vec![vec![Vec::with_capacity(cx.data.rows()); n]; 10];
-    for r in &cx.data.records {
-        let motion = mechanism.motion(&r.x).ok()?;
-        for (k, column) in columns.iter_mut().enumerate() {
-            let mut phi = vec![0.0; 10 * mechanism.robot.bodies.len()];
-            legs.iter().for_each(|b| phi[10 * b + k] = 1.0);
-            let mut gamma = vec![0.0; motion.tree.dof * r.count];
-            mechanism.tree().inverse_dynamics(
-                &mut Default::default(),
-                &phi,
-                &motion.tree,
-                &mut gamma,
-            );
-            let tau = mechanism.project(&motion, &gamma);
-            for (j, out) in column.iter_mut().enumerate() {
-                out.extend(smooth(&tau[j * r.count..(j + 1) * r.count]));
+    let massless = |list: &[usize]| list.iter().all(|b| bodies[*b].inertia.mass() == 0.0);
+    let some = free.iter().any(|(list, _)| massless(list));
+    free.into_iter()
+        .filter(|(list, _)| !some || massless(list))
+        .flat_map(|(list, names)| {
+            let one = move |(name, parts): (&'static str, &'static [usize])| Unknown {
+                name,
+                unit: UNITS[parts[0]],
+                bodies: list.clone(),
+                parts,
+            };
+            names.into_iter().zip(REVOLUTION).map(one)
+        })
+        .collect()
+}
+
+fn legs(cx: &Context) -> Option<Vec<Column>> {
+    let count = 10 * cx.data.plant.robot().bodies.len();
+    unknowns(cx)
+        .iter()
+        .map(|u| {
+            let mut phi = vec![0.0; count];
+            for body in &u.bodies {
+                u.parts.iter().for_each(|k| phi[10 * body + k] = 1.0);
             }
-        }
-    }
-    Some(
-        columns
-            .into_iter()
-            .map(|rows| Column {
-                rows: rows.into_iter().enumerate().collect(),
-            })
-            .collect(),
-    )
+            closed_column(cx, &phi)
+        })
+        .collect()
 }

@@ -37,6 +37,7 @@ mod viscous_friction;
 use super::data::{Column, Data, averaged};
 use super::record::Record;
 use crate::dynamics::Samples;
+use crate::mechanism::ClosedMotion;
 use crate::plant::{Kind, Plant};
 use crate::robot::{JointTerm, Motion};
 use std::sync::OnceLock;
@@ -365,6 +366,35 @@ impl<'a> Context<'a> {
             .collect();
         prune(Column { rows }, j)
     }
+}
+
+/// Actuator forces of a closed chain whose tree has the inertial parameters `phi` (ten a body) and
+/// nothing else, `Gᵀ Y_tree φ`; `None` for a serial robot and poses that cannot be reached.
+pub(crate) fn closed_column(cx: &Context, phi: &[f64]) -> Option<Column> {
+    let mechanism = cx.data.plant.mechanism()?;
+    projected(cx, |motion| {
+        let mut gamma = vec![0.0; motion.tree.dof * motion.tree.count];
+        let tree = mechanism.tree();
+        tree.inverse_dynamics(&mut Default::default(), phi, &motion.tree, &mut gamma);
+        gamma
+    })
+}
+
+/// Generalised forces of the joints of the tree, record by record, as the actuators of a closed
+/// chain feel them: `Gᵀ Γ`.
+pub(crate) fn projected(cx: &Context, gamma: impl Fn(&ClosedMotion) -> Vec<f64>) -> Option<Column> {
+    let mechanism = cx.data.plant.mechanism()?;
+    let mut rows = vec![Vec::with_capacity(cx.data.rows()); cx.data.joints()];
+    for r in &cx.data.records {
+        let motion = mechanism.motion(&r.x).ok()?;
+        let tau = mechanism.project(&motion, &gamma(&motion));
+        for (row, tau) in rows.iter_mut().zip(tau.chunks_exact(r.count)) {
+            row.extend(smooth(tau));
+        }
+    }
+    Some(Column {
+        rows: rows.into_iter().enumerate().collect(),
+    })
 }
 
 /// Drops rows that are zero throughout.

@@ -28,44 +28,32 @@ impl Effect for PassiveJointFriction {
         let Some(mechanism) = cx.data.plant.mechanism() else {
             return Vec::new();
         };
-        let n = cx.data.joints();
-        let mut columns = vec![vec![Vec::new(); n]; 2];
-        for r in &cx.data.records {
-            let Ok(motion) = mechanism.motion(&r.x) else {
-                return Vec::new();
-            };
-            let tree = &motion.tree;
-            let passive = |c: usize| {
-                !mechanism.actuated.contains(&c)
-                    && mechanism.robot.joints[c].motion == Motion::Revolute
-                    && !mechanism
-                        .task_names
-                        .contains(&mechanism.robot.joints[c].name)
-            };
-            for (which, column) in columns.iter_mut().enumerate() {
-                let mut gamma = vec![0.0; tree.dof * r.count];
-                for c in (0..tree.dof).filter(|c| passive(*c)) {
-                    let row = &tree.qd[c * r.count..(c + 1) * r.count];
-                    let top = row.iter().fold(1e-9f64, |m, v| m.max(v.abs()));
-                    for (i, v) in row.iter().enumerate() {
-                        gamma[c * r.count + i] = match which {
-                            0 => crate::diagnose::data::sign(*v, 2e-3 * top),
-                            _ => *v,
-                        };
+        let passive: Vec<usize> = (0..mechanism.robot.dof())
+            .filter(|c| {
+                let joint = &mechanism.robot.joints[*c];
+                !mechanism.actuated.contains(c)
+                    && joint.motion == Motion::Revolute
+                    && !mechanism.task_names.contains(&joint.name)
+            })
+            .collect();
+        let friction = |law: &dyn Fn(f64, f64) -> f64| {
+            projected(cx, |motion| {
+                let (tree, count) = (&motion.tree, motion.tree.count);
+                let mut gamma = vec![0.0; tree.dof * count];
+                for c in &passive {
+                    let row = c * count..(c + 1) * count;
+                    let rates = &tree.qd[row.clone()];
+                    let top = rates.iter().fold(1e-9f64, |m, v| m.max(v.abs()));
+                    for (g, v) in gamma[row].iter_mut().zip(rates) {
+                        *g = law(*v, top);
                     }
                 }
-                let tau = mechanism.project(&motion, &gamma);
-                for (j, out) in column.iter_mut().enumerate() {
-                    out.extend(smooth(&tau[j * r.count..(j + 1) * r.count]));
-                }
-            }
-        }
-        columns
-            .into_iter()
-            .map(|rows| Column {
-                rows: rows.into_iter().enumerate().collect(),
+                gamma
             })
-            .collect()
+        };
+        let dry = friction(&|v, top| crate::diagnose::data::sign(v, 2e-3 * top));
+        let viscous = friction(&|v, _| v);
+        dry.into_iter().chain(viscous).collect()
     }
 
     fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {

@@ -1,6 +1,7 @@
-//! Payload: mass on the last link that the model does not have, `Y_n (m, m c)`.
+//! Payload: mass on the last link or the platform that the model does not have, `Y_n (m, m c)`.
 
 use super::*;
+use crate::simulate::effects::tool_body;
 
 /// Payload.
 pub struct Payload;
@@ -23,7 +24,9 @@ impl Effect for Payload {
     fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
         match (cx.serial(), cx.data.plant.robot().bodies.last()) {
             (true, Some(last)) => vec![vec![last.coordinate]],
-            _ => Vec::new(),
+            (true, None) => Vec::new(),
+            // the platform is moved by all actuators
+            (false, _) => vec![Vec::new()],
         }
     }
 
@@ -33,8 +36,20 @@ impl Effect for Payload {
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let last = cx.data.plant.robot().bodies.len() - 1;
-        link_inertia::body_columns(cx, last, shape[0] as usize)
+        let Some(body) = tool_body(cx.data.plant) else {
+            return Vec::new();
+        };
+        let count = shape[0] as usize;
+        if cx.serial() {
+            return link_inertia::body_columns(cx, body, count);
+        }
+        let size = 10 * cx.data.plant.robot().bodies.len();
+        let column = |k: usize| {
+            let mut phi = vec![0.0; size];
+            phi[10 * body + k] = 1.0;
+            closed_column(cx, &phi)
+        };
+        (0..count).map_while(column).collect()
     }
 
     fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {

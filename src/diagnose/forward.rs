@@ -1,0 +1,214 @@
+//! What a user of the simulator sees: the robot simulated under the torques of a log, with the
+//! nominal model, with the refitted one and with the effects found.
+//!
+//! Driven by the recorded torque alone every model drifts away, so a soft spring and damper of
+//! natural frequency `ω` ([`BANDWIDTH`]) and ratio 1 hold the simulated robot to the recorded motion
+//! `x_m`. With the deviation `e = x − x_m`, friction `λ` and the torque `τ_e` of the effects:
+//!
+//! ```text
+//! M (ẍ_m + ë) + h + Dᵀ (F_v q̇ + o + λ) = D_aᵀ (τ − τ_e) − M (ω² e + 2 ω ė)      |λ_j| ≤ F_c,j
+//! ```
+//!
+//! all of it at `x_m + e`. A model that is right stays on the recorded motion; a torque `r` that it
+//! lacks moves it by about `r / (M ω²)` where it changes slower than `ω`, by less where it changes
+//! faster. The step is implicit in the velocity (Moreau 1988), one a sample; dry
+//! friction is set-valued, from the same quadratic program as in [`simulate`](crate::simulate).
+//!
+//! Effects act as the torque that their columns give along the recorded motion, not along the
+//! simulated one. Torque noise is not taken off.
+
+use super::catalogue::{Context, Effect};
+use super::data::Data;
+use super::record::Record;
+use super::verdict::Member;
+use crate::error::{Error, Result};
+use crate::estimate::robot::with_values;
+use crate::robot::{Motion, Robot};
+use crate::simulate::Dynamics;
+use crate::simulate::friction::hold;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Natural frequency of the spring that holds the robot to the recorded motion, Hz.
+pub const BANDWIDTH: f64 = 2.0;
+/// Longest part of a record that is simulated, s.
+pub const LONGEST: f64 = 20.0;
+/// The models, in the order of every array of three.
+pub const MODELS: [&str; 3] = ["nominal", "refitted", "improved"];
+
+/// Simulation of one record with the three [`MODELS`].
+#[derive(Debug, Clone)]
+pub struct Simulated {
+    /// name of the record
+    pub record: String,
+    /// whether it was fitted to
+    pub fit: bool,
+    /// rms of the deviation from the log by actuator, rad or m; `None` for a model that cannot be
+    /// simulated
+    pub rms: [Option<Vec<f64>>; 3],
+    /// times, s
+    pub t: Vec<f64>,
+    /// deviation by actuator, rad or m; empty for a model that cannot be simulated
+    pub deviation: [Vec<Vec<f64>>; 3],
+}
+
+/// Forward simulation of the holdout records (of the first fitted one where there is none).
+#[derive(Debug, Clone, Default)]
+pub struct Forward {
+    /// records
+    pub records: Vec<Simulated>,
+    /// units of the deviations by actuator
+    pub units: Vec<&'static str>,
+    /// models that could not be simulated, in words
+    pub failed: Vec<String>,
+}
+
+/// Torque of the effects along the recorded motion, by actuator over all records.
+pub fn effects_torque(
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    members: &[Member],
+) -> Vec<Vec<f64>> {
+    let data = cx.data;
+    let mut torque = vec![vec![0.0; data.rows()]; data.joints()];
+    for c in members.iter().map(|m| &m.candidate) {
+        let columns = effects[c.effect].columns(cx, &c.place, &c.shape, false);
+        for (column, eta) in columns.iter().zip(&c.eta) {
+            for (j, values) in &column.rows {
+                for (t, v) in torque[*j].iter_mut().zip(values) {
+                    *t += eta * v;
+                }
+            }
+        }
+    }
+    torque
+}
+
+/// Simulates with the parameters of the three [`MODELS`]; the torque of the effects acts in the last.
+pub fn forward(data: &Data, phi: [&[f64]; 3], effects: &[Vec<f64>]) -> Forward {
+    let count = data.plant.parameters().len();
+    let robots = phi.map(|phi| with_values(data.plant, &phi[..count]));
+    let held: Vec<usize> = (0..data.records.len())
+        .filter(|k| !data.records[*k].fit)
+        .collect();
+    let chosen = if held.is_empty() { vec![0] } else { held };
+    let tasks: Vec<(usize, usize)> = chosen
+        .iter()
+        .flat_map(|k| (0..3).map(|m| (*k, m)))
+        .collect();
+    let mut runs = tasks
+        .par_iter()
+        .map(|(k, m)| run(data, *k, &robots[*m], (*m == 2).then_some(effects)))
+        .collect::<Vec<_>>()
+        .into_iter();
+    let mut out = Forward {
+        units: (0..data.joints())
+            .map(|j| match data.plant.actuators()[j].motion {
+                Motion::Revolute => "rad",
+                Motion::Prismatic => "m",
+            })
+            .collect(),
+        ..Forward::default()
+    };
+    for k in chosen {
+        let r = &data.records[k];
+        let deviation = MODELS.map(|model| match runs.next() {
+            Some(Ok(deviation)) => deviation,
+            Some(Err(e)) => {
+                out.failed.push(format!("{}, {model} model: {e}", r.name));
+                Vec::new()
+            }
+            None => Vec::new(),
+        });
+        let rms = |x: &Vec<f64>| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt();
+        out.records.push(Simulated {
+            record: r.name.clone(),
+            fit: r.fit,
+            rms: std::array::from_fn(|m| {
+                (!deviation[m].is_empty()).then(|| deviation[m].iter().map(rms).collect())
+            }),
+            t: (0..length(r)).map(|i| i as f64 * r.dt).collect(),
+            deviation,
+        });
+    }
+    out
+}
+
+/// Samples of a record that are simulated.
+fn length(r: &Record) -> usize {
+    r.count.min((LONGEST / r.dt) as usize + 1)
+}
+
+/// Deviation from record `k` by actuator.
+fn run(
+    data: &Data,
+    k: usize,
+    robot: &Robot,
+    effects: Option<&[Vec<f64>]>,
+) -> Result<Vec<Vec<f64>>> {
+    let (plant, r) = (data.plant, &data.records[k]);
+    let (m, n, na) = (plant.coordinates(), robot.dof(), data.joints());
+    let bodies = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
+    let armature = robot.joints.iter().map(|j| j.terms[0]).collect();
+    let mut dynamics = Dynamics::new(plant, bodies, armature, robot.gravity);
+    let viscous = DVector::from_fn(n, |j, _| robot.joints[j].terms[1]);
+    let offset = DVector::from_fn(n, |j, _| robot.joints[j].terms[3]);
+    let dry: Vec<usize> = (0..n).filter(|j| robot.joints[*j].terms[2] > 0.0).collect();
+    let coulomb: Vec<f64> = dry.iter().map(|j| robot.joints[*j].terms[2]).collect();
+    let slack: Vec<f64> = coulomb.iter().map(|f| -f).collect();
+
+    let (h, omega) = (r.dt, TAU * BANDWIDTH);
+    let at = |rows: &[f64], i: usize| DVector::from_fn(m, |c, _| rows[c * r.count + i]);
+    let span = (0..m)
+        .map(|c| {
+            let row = &r.x.q[c * r.count..(c + 1) * r.count];
+            row.iter().fold(0.0f64, |a, v| a.max((v - row[0]).abs()))
+        })
+        .fold(1.0, f64::max);
+    let (mut e, mut ed) = (DVector::zeros(m), DVector::zeros(m));
+    let mut out = vec![Vec::with_capacity(length(r)); na];
+    for i in 0..length(r) {
+        let (v, a) = (at(&r.x.qd, i), at(&r.x.qdd, i));
+        let terms = dynamics.terms(&(at(&r.x.q, i) + &e), &(&v + &ed))?;
+        let moved = &terms.d_a * &e;
+        out.iter_mut()
+            .zip(moved.iter())
+            .for_each(|(o, x)| o.push(*x));
+        let tau = DVector::from_fn(na, |j, _| {
+            let row = data.start[k] + i;
+            data.tau[j][row] - effects.map_or(0.0, |t| t[j][row])
+        });
+        let steady = &terms.d * &v;
+        let opposed = terms.d.tr_mul(&(viscous.component_mul(&steady) + &offset));
+        let force = terms.d_a.tr_mul(&tau) - &terms.mass * (&a + &e * omega.powi(2)) - &terms.bias;
+        let slope = terms
+            .d
+            .tr_mul(&DMatrix::from_fn(n, m, |j, c| viscous[j] * terms.d[(j, c)]));
+        let left = &terms.mass * (1.0 + 2.0 * omega * h + (omega * h).powi(2)) + slope * h;
+        let Some(left) = left.cholesky() else {
+            return Err(Error::Infeasible(format!(
+                "its mass matrix is not positive definite at {:.3} s: no such robot exists",
+                i as f64 * r.dt
+            )));
+        };
+        let free = left.solve(&(&terms.mass * &ed + (force - opposed) * h));
+        let rows = DMatrix::from_fn(dry.len(), m, |d, c| terms.d[(dry[d], c)]);
+        let spread = left.solve(&rows.transpose()) * h;
+        let friction = hold(
+            &(&rows * &spread),
+            &(&rows * (&v + &free)),
+            &slack,
+            &coulomb,
+        );
+        ed = free - spread * friction;
+        e += &ed * h;
+        if !e.iter().all(|x| x.abs() < 10.0 * span) {
+            return Err(Error::Infeasible(format!(
+                "the simulated robot leaves the recorded motion at {:.3} s",
+                i as f64 * r.dt
+            )));
+        }
+    }
+    Ok(out)
+}
