@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::noise::{LINES, Noise, between_periods, spectrum};
-use super::record::{Record, triangle};
+use super::record::Record;
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::mechanism::Mechanism;
@@ -15,6 +15,11 @@ use rayon::prelude::*;
 
 /// Sub-steps of a sampling interval over which what is not smooth is averaged.
 pub const FINE: usize = 4;
+
+/// Part of its fastest speed below which a drive of a closed chain may stand.
+const STANDS: f64 = 0.01;
+/// Time by which velocities from positions are blurred, s.
+const BLUR: f64 = 0.015;
 
 /// A column of a linear model: values on the rows of some actuators, all records one after another
 /// (the fitted ones first).
@@ -72,6 +77,8 @@ pub struct Data<'a> {
     pub speed: Vec<f64>,
     /// lowest and highest position of each actuator in the fitted records
     pub range: Vec<[f64; 2]>,
+    /// rows of each actuator that count for nothing, for it may stick there; empty: none
+    pub held: Vec<Vec<bool>>,
 }
 
 impl<'a> Data<'a> {
@@ -175,7 +182,9 @@ impl<'a> Data<'a> {
             window: 0.0,
             speed,
             range,
+            held: vec![Vec::new(); n],
         };
+        data.held = data.sticking();
         data.coulomb();
         data.noise = match noise {
             Some(noise) => noise,
@@ -230,11 +239,16 @@ impl<'a> Data<'a> {
         out
     }
 
-    /// A signal of all records, whitened as actuator `j` is.
+    /// A signal of all records, whitened as actuator `j` is; 0 where it may stick.
     pub fn whiten(&self, j: usize, x: &[f64]) -> Vec<f64> {
         let mut out = Vec::with_capacity(x.len());
         for k in 0..self.records.len() {
             self.noise[j].whiten(&x[self.span(k)], &mut out);
+        }
+        for (x, held) in out.iter_mut().zip(&self.held[j]) {
+            if *held {
+                *x = 0.0;
+            }
         }
         out
     }
@@ -454,7 +468,7 @@ impl<'a> Data<'a> {
     }
 
     /// What a log of any robot may have without being at odds with its model: reversals of friction
-    /// that are not perfectly sharp, and drives of parallel robots that stick there.
+    /// that are not perfectly sharp.
     pub fn ordinary(&mut self) {
         if self.plant.mechanism().is_some_and(redundant) {
             return;
@@ -467,38 +481,34 @@ impl<'a> Data<'a> {
             let (sharp, wide) = (1e-3 * self.speed[j], 8e-3 * self.speed[j]);
             let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
             self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
-            if self.plant.mechanism().is_some() {
-                let sharp = self.own(j, |_, v| sign(v, sharp));
-                for column in self.sticking(&sharp) {
-                    self.add_nuisance("sticking", &Column::on(j, column), 0.5 * coulomb);
-                }
-            }
         }
     }
 
-    /// What sticking adds to Coulomb friction `s = sgn q̇`: while a drive stands, its friction is
-    /// whatever the controller's torque leaves to hold, and passes from one side to the other in a
-    /// time of the loop's bandwidth and not of the velocity. With the mean `s̄` over a triangle of
-    /// ± `T`: `s̄ − s` (a slow passage) and `T ds̄/dt` (one that comes early or late).
-    fn sticking(&self, sign: &[f64]) -> Vec<Vec<f64>> {
-        let mut all = Vec::new();
-        for time in [0.01, 0.03] {
-            let mut slow = Vec::with_capacity(sign.len());
-            let mut early = Vec::with_capacity(sign.len());
-            for (k, r) in self.records.iter().enumerate() {
-                let s = &sign[self.span(k)];
-                let half = ((time / r.dt).round() as usize).max(1);
-                let mean = triangle(s, half + 1);
-                slow.extend(mean.iter().zip(s).map(|(m, s)| m - s));
-                let last = mean.len() - 1;
-                early.extend((0..=last).map(|i| {
-                    let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-                    (mean[b] - mean[a]) / (b - a) as f64 * half as f64
-                }));
-            }
-            all.extend([slow, early]);
-        }
-        all
+    /// Rows of each actuator of a closed chain in which it may stick, and those up to [`BLUR`] about
+    /// them: a drive at rest holds any torque within its friction, so they say nothing about the
+    /// model.
+    fn sticking(&self) -> Vec<Vec<bool>> {
+        let Some(mechanism) = self.plant.mechanism().filter(|m| !redundant(m)) else {
+            return vec![Vec::new(); self.joints()];
+        };
+        let joints = mechanism.actuated.iter().zip(&self.speed).enumerate();
+        joints
+            .map(|(j, (joint, speed))| {
+                let mut held = vec![false; self.rows()];
+                if mechanism.robot.joints[*joint].terms[2] == 0.0 {
+                    return held;
+                }
+                for (k, r) in self.records.iter().enumerate() {
+                    let half = (BLUR / r.dt).round() as usize;
+                    let held = &mut held[self.span(k)];
+                    let v = r.state(j).1;
+                    for i in (0..v.len()).filter(|i| v[*i].abs() < STANDS * speed) {
+                        held[i.saturating_sub(half)..(i + half + 1).min(v.len())].fill(true);
+                    }
+                }
+                held
+            })
+            .collect()
     }
 
     /// Torque of the nominal model with parameters `phi`, by actuator, over all records.
