@@ -169,7 +169,7 @@ fn stribeck_friction_of_another_formula() {
     assert!(f.holdout > 0.7, "shrinks {}", f.holdout);
     // an interval about the share, and a simulated robot that follows the log more closely
     assert!(f.interval[0] <= f.explains && f.explains <= f.interval[1]);
-    assert!(f.interval[1] - f.interval[0] < 0.3, "{:?}", f.interval);
+    assert!(f.interval[1] - f.interval[0] < 0.4, "{:?}", f.interval);
     let simulated = &d.forward.records[0];
     assert!(!simulated.fit && d.forward.failed.is_empty());
     let joint = |m: usize| simulated.rms[m].as_ref().expect("a run")[1];

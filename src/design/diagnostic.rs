@@ -148,9 +148,11 @@ impl<'a> Checker<'a> {
         Ok((0..moved.dof).all(|a| {
             let l = &names[a].limits;
             let [low, high] = l.position;
-            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * self.derate);
+            let room = 0.5 * (high - low) * (1.0 - self.derate);
+            let room = if room.is_finite() { room } else { 0.0 };
             (a * SAMPLES..(a + 1) * SAMPLES).all(|i| {
-                !((moved.q[i] - middle).abs() > half)
+                moved.q[i] >= low + room
+                    && moved.q[i] <= high - room
                     && moved.qd[i].abs() <= l.velocity * self.derate
                     && moved.qdd[i].abs() <= l.acceleration * self.derate
                     && tau[i].abs() <= l.effort * self.derate

@@ -4,7 +4,7 @@
 #![allow(clippy::needless_range_loop)]
 
 use super::noise::{LINES, Noise, between_periods, spectrum};
-use super::record::{Record, triangle};
+use super::record::Record;
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::mechanism::Mechanism;
@@ -22,6 +22,10 @@ const ROUNDED: [f64; 3] = [2e-3, 4e-3, 8e-3];
 const BENT: f64 = 0.1;
 /// How long that lasts to either side, s.
 const NEAR: f64 = 0.012;
+/// Part of its fastest speed below which a drive of a closed chain may stand.
+const STANDS: f64 = 0.01;
+/// Time by which velocities from positions are blurred, s.
+const BLUR: f64 = 0.015;
 
 /// A column of a linear model: values on the rows of some actuators, all records one after another
 /// (the fitted ones first).
@@ -70,7 +74,7 @@ pub struct Data<'a> {
     pub tau: Vec<Vec<f64>>,
     /// noise by actuator
     pub noise: Vec<Noise>,
-    /// weight of every row by actuator, 1 away from reversals
+    /// weight of every row by actuator: 1 away from reversals, 0 where a drive may stick
     pub weights: Vec<Vec<f64>>,
     /// inertia that an actuator accelerates, about the middle of the motion, kg m² or kg
     pub inertia: Vec<f64>,
@@ -254,7 +258,11 @@ impl<'a> Data<'a> {
 
     /// A whitened and weighted signal of all records as it was before, in units of the noise.
     pub fn unwhiten(&self, j: usize, x: &[f64]) -> Vec<f64> {
-        let plain: Vec<f64> = x.iter().zip(&self.weights[j]).map(|(x, w)| x / w).collect();
+        let plain: Vec<f64> = x
+            .iter()
+            .zip(&self.weights[j])
+            .map(|(x, w)| if *w > 0.0 { x / w } else { 0.0 })
+            .collect();
         let mut out = Vec::with_capacity(x.len());
         for k in 0..self.records.len() {
             self.noise[j].unwhiten(&plain[self.span(k)], &mut out);
@@ -498,8 +506,8 @@ impl<'a> Data<'a> {
     }
 
     /// What a log of any robot may have without being at odds with its model: reversals of friction
-    /// that are not perfectly sharp, a motion close to them that friction bends faster than
-    /// positions show, and drives of parallel robots that stick there.
+    /// that are not perfectly sharp, and a motion close to them that friction bends faster than
+    /// positions show.
     pub fn ordinary(&mut self) {
         if self.plant.mechanism().is_some_and(redundant) {
             return;
@@ -509,45 +517,32 @@ impl<'a> Data<'a> {
             if coulomb == 0.0 {
                 continue;
             }
-            self.weights[j] = self.doubt(j, coulomb);
+            self.weights[j] = match self.plant.mechanism() {
+                None => self.doubt(j, coulomb),
+                Some(_) => self.sticking(j),
+            };
             let sharp = 1e-3 * self.speed[j];
             // tanh of three widths: any rounding in between is close to a sum of them
             for wide in ROUNDED.map(|w| w * self.speed[j]) {
                 let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
                 self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
             }
-            if self.plant.mechanism().is_some() {
-                let sharp = self.own(j, |_, v| sign(v, sharp));
-                for column in self.sticking(&sharp) {
-                    self.add_nuisance("sticking", &Column::on(j, column), 0.5 * coulomb);
-                }
-            }
         }
     }
 
-    /// What sticking adds to Coulomb friction `s = sgn q̇`: while a drive stands, its friction is
-    /// whatever the controller's torque leaves to hold, and passes from one side to the other in a
-    /// time of the loop's bandwidth and not of the velocity. With the mean `s̄` over a triangle of
-    /// ± `T`: `s̄ − s` (a slow passage) and `T ds̄/dt` (one that comes early or late).
-    fn sticking(&self, sign: &[f64]) -> Vec<Vec<f64>> {
-        let mut all = Vec::new();
-        for time in [0.01, 0.03] {
-            let mut slow = Vec::with_capacity(sign.len());
-            let mut early = Vec::with_capacity(sign.len());
-            for (k, r) in self.records.iter().enumerate() {
-                let s = &sign[self.span(k)];
-                let half = ((time / r.dt).round() as usize).max(1);
-                let mean = triangle(s, half + 1);
-                slow.extend(mean.iter().zip(s).map(|(m, s)| m - s));
-                let last = mean.len() - 1;
-                early.extend((0..=last).map(|i| {
-                    let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-                    (mean[b] - mean[a]) / (b - a) as f64 * half as f64
-                }));
+    /// Weights of the rows of an actuator of a closed chain: 0 where it may stick and up to [`BLUR`]
+    /// about there, 1 elsewhere. A drive at rest holds any torque within its friction, so such rows
+    /// say nothing about the model.
+    fn sticking(&self, j: usize) -> Vec<f64> {
+        self.each(|r, _| {
+            let v = r.state(j).1;
+            let half = (BLUR / r.dt).round() as usize;
+            let mut weights = vec![1.0; v.len()];
+            for i in (0..v.len()).filter(|i| v[*i].abs() < STANDS * self.speed[j]) {
+                weights[i.saturating_sub(half)..(i + half + 1).min(v.len())].fill(0.0);
             }
-            all.extend([slow, early]);
-        }
-        all
+            weights
+        })
     }
 
     /// Torque of the nominal model with parameters `phi`, by actuator, over all records.

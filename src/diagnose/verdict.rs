@@ -98,11 +98,11 @@ const SOUND: f64 = 0.5;
 const FLOOR: f64 = 0.25;
 /// Imperfection of a sound model, per row, that counts neither for nor against an effect.
 const SLACK: f64 = 0.05;
-/// Share of the gap on its joints, on fitted and on holdout records, that an effect must explain.
+/// Share of the gap on its joints that an effect must explain.
 const LEAST_SHARE: f64 = 0.05;
 /// The same of the gap of all joints.
 const LEAST_OF_ALL: f64 = 0.012;
-/// Share explained on holdout records over that on fitted ones, at least.
+/// Fall of the gap on its joints per row of holdout records over that of fitted ones, at least.
 const HELD: f64 = 0.4;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
@@ -157,9 +157,12 @@ impl State<'_> {
         self.evidence.j0 - fit.gain - chi
     }
 
-    /// Whether an effect may show in the parameters that the nominal model would need.
-    fn hides(&self, c: &Candidate) -> bool {
-        self.effects[c.effect].hides()
+    /// Whether member `i` may show in nothing but the parameters that the nominal model would need.
+    /// Not where another one shows on its joints: what that one's formula misses moves them, too.
+    fn may_hide(&self, set: &[Candidate], i: usize) -> bool {
+        let hides = |c: &Candidate| self.effects[c.effect].hides();
+        let shown = |c: &Candidate| !hides(c) && c.place.iter().any(|j| set[i].place.contains(j));
+        hides(&set[i]) && !set.iter().any(shown)
     }
 
     /// Joints on whose rows an effect acts most.
@@ -487,7 +490,7 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     if significant && generalises {
         return true;
     }
-    st.hides(&set[i])
+    st.may_hide(set, i)
         && prior > SURPRISE
         && prior > 0.5 * visible.abs()
         && (held == 0 || hold > -0.02 * held as f64)
@@ -547,7 +550,7 @@ fn judge(
     let fall = surprise_without - surprise_after;
     let prior = fall / (surprise_without - free).max(1.0);
     let chi_gain = gain - fall;
-    let frozen = st.hides(c) && chi_gain < 0.5 * gain && fall > SURPRISE;
+    let frozen = st.may_hide(set, i) && chi_gain < 0.5 * gain && fall > SURPRISE;
     let share = if frozen { prior } else { visible };
     let held = data.rows() - data.fitted;
     let (hw, ha) = (sum(&st.gap(&r0, false)), sum(&st.gap(&r1, false)));
@@ -669,26 +672,25 @@ fn judge(
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
-    // what explains next to nothing, or nothing where it was not fitted, is no finding
+    // what explains next to nothing, or far less where it was not fitted, is no finding; nor is
+    // anything where the gap without it is what a sound model leaves
     let matters = match frozen {
         true => 1.0,
         false => {
-            let over = |gap: &[f64], rows: usize| -> f64 {
-                let floor = st.floor * rows as f64;
+            let over = |gap: &[f64]| -> f64 {
+                let floor = st.floor * rows;
                 joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
             };
-            let gone = |before: f64, after: f64| (before - after) / before.max(1e-9);
-            let seen = gone(over(&without, data.fitted), over(after, data.fitted));
-            let unseen = match held {
-                0 => seen,
-                _ => gone(
-                    over(&st.gap(&r0, false), held),
-                    over(&st.gap(&r1, false), held),
-                ),
+            let seen = (over(&without) - over(after)) / over(&without).max(1e-9);
+            let held_up = match held {
+                0 => 1.0,
+                _ => (hw - ha) / held as f64 / ((w - a) / rows).max(1e-9),
             };
-            logistic((seen.min(unseen) - LEAST_SHARE) / 0.01)
-                * logistic((explains.min(holdout) - LEAST_OF_ALL) / 0.003)
-                * logistic((holdout - HELD * explains) / (0.05 * explains.max(1e-9)))
+            let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+            logistic((seen - LEAST_SHARE) / 0.01)
+                * logistic((explains - LEAST_OF_ALL) / 0.003)
+                * logistic((held_up - HELD) / 0.05)
+                * logistic((there - SOUND) / 0.03)
         }
     };
     let together = size
