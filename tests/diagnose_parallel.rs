@@ -179,7 +179,7 @@ fn a_delta_is_diagnosed() {
     let r = Rehearsal::new("delta");
     let clean = r.of("none", Effects::default());
     assert!(claims(&clean).is_empty(), "{:?}", claims(&clean));
-    let friction = r.passive(&rods(3), 0.02, 0.005);
+    let friction = r.passive(&rods(3), 0.1, 0.02);
     assert_eq!(first(&friction), Some("passive_joint_friction"));
     let legs = r.massless();
     assert_eq!(first(&legs), Some("leg_inertia"));
