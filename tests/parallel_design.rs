@@ -234,7 +234,7 @@ fn limits_hold_at_100_khz_for_designs_that_use_them() {
 
 #[test]
 fn bundled_parallel_robots_are_designed_inside_their_limits() {
-    for (name, most) in [("hexapod", 60.0), ("h4", 400.0), ("delta", 400.0)] {
+    for (name, most) in [("hexapod", 60.0), ("h4", 20.0), ("delta", 40.0)] {
         let plant = bundled(name);
         let m = mechanism(&plant);
         let design = run(m, &quick(1));
