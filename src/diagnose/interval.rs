@@ -1,7 +1,7 @@
 //! Interval of the share that an effect explains: a block bootstrap over whole seconds.
 //!
 //! Residuals are autocorrelated, so single samples are no independent draws; blocks of [`BLOCK`]
-//! nearly are (Künsch 1989). With the energies of block `b` without the effect `w_b`, with it `a_b`,
+//! (or a sixteenth of the fitted time, where that is shorter) nearly are (Künsch 1989). With the energies of block `b` without the effect `w_b`, with it `a_b`,
 //! and of the whole gap above the noise `t_b`, resampled with replacement within the fitted records:
 //!
 //! ```text
@@ -12,7 +12,7 @@ use super::data::Data;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Length of a block, s.
+/// Longest length of a block, s.
 pub const BLOCK: f64 = 1.0;
 const RESAMPLES: usize = 400;
 
@@ -27,9 +27,12 @@ pub fn explained(
     explains: f64,
     seed: u64,
 ) -> [f64; 2] {
+    let fitted = data.records.iter().filter(|r| r.fit);
+    let time: f64 = fitted.map(|r| r.count as f64 * r.dt).sum();
+    let block = BLOCK.min(time / 16.0);
     let mut blocks = Vec::new();
     for (k, r) in data.records.iter().enumerate().filter(|(_, r)| r.fit) {
-        let size = ((BLOCK / r.dt).round() as usize).max(1);
+        let size = ((block / r.dt).round() as usize).max(1);
         let span = data.span(k);
         for from in span.clone().step_by(size) {
             let part = from..(from + size).min(span.end);

@@ -14,7 +14,15 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             true => f.title.to_string(),
             false => format!("{} on {}", f.title, f.joints.join(" and ")),
         };
-        claims.iter().map(each).collect::<Vec<_>>().join("; ")
+        match (claims.as_slice(), d.findings.first()) {
+            ([], Some(f)) if !f.same.is_empty() => format!(
+                "{} or {}, which these records do not tell apart",
+                each(&f),
+                f.same.join(" or ").replace('_', " ")
+            ),
+            ([], Some(f)) => format!("probably {} ({} sure)", each(&f), percent(f.confidence)),
+            _ => claims.iter().map(each).collect::<Vec<_>>().join("; "),
+        }
     };
     let left = percent(d.unexplained);
     match d.verdict {
