@@ -102,6 +102,8 @@ const SLACK: f64 = 0.05;
 const LEAST_SHARE: f64 = 0.05;
 /// The same of the gap of all joints.
 const LEAST_OF_ALL: f64 = 0.012;
+/// Gap per row of a joint, in noise variances, in which an effect can be found at all.
+const LEAST_GAP: f64 = 0.15;
 /// Fall of the gap on its joints per row of holdout records over that of fitted ones, at least.
 const HELD: f64 = 0.4;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
@@ -690,7 +692,7 @@ fn judge(
             logistic((seen - LEAST_SHARE) / 0.01)
                 * logistic((explains - LEAST_OF_ALL) / 0.003)
                 * logistic((held_up - HELD) / 0.05)
-                * logistic((there - SOUND) / 0.02)
+                * logistic((there - LEAST_GAP) / 0.02)
         }
     };
     let together = size
