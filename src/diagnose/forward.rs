@@ -23,9 +23,11 @@ use super::record::Record;
 use super::verdict::Member;
 use crate::error::{Error, Result};
 use crate::estimate::robot::with_values;
-use crate::robot::{Motion, Robot};
+use crate::report::format::unit_of;
+use crate::robot::Robot;
 use crate::simulate::Dynamics;
 use crate::simulate::friction::hold;
+use crate::trajectory::certificate::Kind;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -104,10 +106,7 @@ pub fn forward(data: &Data, phi: [&[f64]; 3], effects: &[Vec<f64>]) -> Forward {
         .into_iter();
     let mut out = Forward {
         units: (0..data.joints())
-            .map(|j| match data.plant.actuators()[j].motion {
-                Motion::Revolute => "rad",
-                Motion::Prismatic => "m",
-            })
+            .map(|j| unit_of(Kind::Position, data.plant.actuators()[j].motion))
             .collect(),
         ..Forward::default()
     };

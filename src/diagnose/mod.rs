@@ -348,16 +348,15 @@ pub fn of_logs(
         .collect();
     let fit = evidence.fit(&members);
     let phi_after = evidence.parameters(&members, &fit);
-    let plain = |set: &[&Projected], fit: &evidence::Fit| -> Vec<Vec<f64>> {
-        evidence
-            .unwhitened(&evidence.residual(set, fit))
-            .into_iter()
-            .enumerate()
-            .map(|(j, e)| e.into_iter().map(|v| v * data.noise[j].std).collect())
-            .collect()
+    let scatter = |set: &[&Projected]| -> Vec<Vec<f64>> {
+        evidence.unwhitened(&evidence.residual(set, &evidence.fit(set)))
     };
-    let refit = plain(&[], &none);
-    let after = plain(&members, &fit);
+    let (all, gap) = (scatter(&members), scatter(&[]));
+    let plain = |scatter: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let row = |(j, e): (usize, &Vec<f64>)| e.iter().map(|v| v * data.noise[j].std).collect();
+        scatter.iter().enumerate().map(row).collect()
+    };
+    let (refit, after) = (plain(&gap), plain(&all));
     let model = data.model_torque(&evidence.phi);
     let frozen: Vec<Vec<f64>> = (0..data.joints())
         .map(|j| {
@@ -366,10 +365,6 @@ pub fn of_logs(
         })
         .collect();
 
-    let scatter = |set: &[&Projected]| -> Vec<Vec<f64>> {
-        evidence.unwhitened(&evidence.residual(set, &evidence.fit(set)))
-    };
-    let (all, gap) = (scatter(&members), scatter(&[]));
     let mut findings = Vec::new();
     for (i, m) in decision.members.iter().enumerate() {
         let mut rest = members.clone();

@@ -14,6 +14,7 @@ use super::evidence::{Evidence, Fit, Projected};
 use super::gap;
 use super::search::{Candidate, best_shape};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What became of a rival.
 #[derive(Debug, Clone)]
@@ -121,6 +122,12 @@ struct State<'a> {
 }
 
 impl State<'_> {
+    /// By how much `J` falls with a set.
+    fn gain(&self, set: &[Candidate]) -> f64 {
+        let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
+        self.evidence.fit(&set).gain
+    }
+
     fn fit(&self, set: &[Candidate]) -> (Fit, Vec<Vec<f64>>) {
         let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
         let fit = self.evidence.fit(&set);
@@ -152,11 +159,7 @@ impl State<'_> {
     /// Penalty of the prior with a set.
     fn surprise(&self, fit: &Fit, residual: &[Vec<f64>]) -> f64 {
         let fitted = self.evidence.data.fitted;
-        let chi: f64 = residual
-            .iter()
-            .map(|e| e[..fitted].iter().map(|v| v * v).sum::<f64>())
-            .sum();
-        self.evidence.j0 - fit.gain - chi
+        self.evidence.j0 - fit.gain - energy(residual, 0..fitted)
     }
 
     /// Whether member `i` may show in nothing but the parameters that the nominal model would need.
@@ -216,7 +219,7 @@ impl State<'_> {
             && grown.len() == 2
             && let Some(mut pair) = best_pair(self, list)
         {
-            let gain = |s: &[Candidate]| self.fit(s).0.gain;
+            let gain = |s: &[Candidate]| self.gain(s);
             self.polish(&mut pair);
             let each = |i: usize| accepted(self, &pair, i);
             if gain(&pair) > gain(&grown) + 0.01 * total && (0..2).all(each) {
@@ -314,6 +317,12 @@ fn others(set: &[Candidate], i: usize) -> Vec<Candidate> {
         .filter(|(k, _)| *k != i)
         .map(|(_, c)| c.clone())
         .collect()
+}
+
+/// Squares of a residual on some rows of every actuator.
+fn energy(residual: &[Vec<f64>], rows: Range<usize>) -> f64 {
+    let of = |e: &Vec<f64>| e[rows.clone()].iter().map(|v| v * v).sum::<f64>();
+    residual.iter().map(of).sum()
 }
 
 fn logistic(x: f64) -> f64 {
@@ -444,7 +453,7 @@ pub fn decide(
 
 /// Gain of member `i` beside the others.
 fn gained(st: &State, set: &[Candidate], i: usize) -> f64 {
-    st.fit(set).0.gain - st.fit(&others(set, i)).0.gain
+    st.gain(set) - st.gain(&others(set, i))
 }
 
 /// By how much coefficients are less certain than independent samples of unit noise would make them.
@@ -469,22 +478,11 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let rows = data.fitted as f64;
     let (f0, r0) = st.fit(&others(set, i));
     let (f1, r1) = st.fit(set);
-    let chi = |r: &[Vec<f64>], fit: bool| -> f64 {
-        r.iter()
-            .map(|e| {
-                let part = if fit {
-                    &e[..data.fitted]
-                } else {
-                    &e[data.fitted..]
-                };
-                part.iter().map(|v| v * v).sum::<f64>()
-            })
-            .sum()
-    };
-    let visible = chi(&r0, true) - chi(&r1, true);
+    let fall = |rows: Range<usize>| energy(&r0, rows.clone()) - energy(&r1, rows);
+    let visible = fall(0..data.fitted);
     let prior = (f1.gain - f0.gain) - visible;
     let held = data.rows() - data.fitted;
-    let hold = chi(&r0, false) - chi(&r1, false);
+    let hold = fall(data.fitted..data.rows());
     let gap = st.gap(&r0, true);
     let there: f64 = st.joints_of(&set[i]).iter().map(|j| gap[*j].max(0.0)).sum();
     let significant = visible > LEAST * rows && visible > 0.02 * there;
@@ -585,7 +583,7 @@ fn judge(
         // what it gains in place of the member, not what it would gain beside it
         let mut both = set.to_vec();
         both.push(r.clone());
-        let instead = r.gain - (st.fit(&both).0.gain - f1.gain);
+        let instead = r.gain - (st.gain(&both) - f1.gain);
         let other = match frozen {
             true => {
                 let mut alone = rest.clone();
@@ -641,13 +639,9 @@ fn judge(
         .fold(1.0f64, |m, r| m.min(r.loss));
     let alone = logistic((best - 0.35) / 0.04) * logistic((share - 0.15) / 0.02);
     // gain on holdout records per row against that on fitted ones: the same effect is at work there
-    let chi = |e: &[Vec<f64>]| -> f64 {
-        e.iter()
-            .map(|e| e[data.fitted..].iter().map(|v| v * v).sum::<f64>())
-            .sum()
-    };
+    let kept = |e: &[Vec<f64>]| energy(e, data.fitted..data.rows());
     let repeats = match held > 0 && !frozen {
-        true => (chi(&r0) - chi(&r1)) / held as f64 / (chi_gain / rows).max(1e-9),
+        true => (kept(&r0) - kept(&r1)) / held as f64 / (chi_gain / rows).max(1e-9),
         false => 1.0,
     };
     let quad = |m: &faer::Mat<f64>| -> f64 {

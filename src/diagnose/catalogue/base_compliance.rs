@@ -219,12 +219,9 @@ pub(crate) fn tilted(
                     row.extend((at..at + r.count).map(|i| (plus[i] - minus[i]) / (2.0 * step)));
                 }
             }
-            prune(
-                Column {
-                    rows: rows.into_iter().enumerate().collect(),
-                },
-                0,
-            )
+            prune(Column {
+                rows: rows.into_iter().enumerate().collect(),
+            })
         })
         .collect()
 }

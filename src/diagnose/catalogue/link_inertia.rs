@@ -87,12 +87,9 @@ fn in_proportion(cx: &Context, body: usize) -> Option<Column> {
                 .for_each(|(r, v)| *r += scale * v);
         }
     }
-    let column = prune(
-        Column {
-            rows: rows.into_iter().enumerate().collect(),
-        },
-        0,
-    );
+    let column = prune(Column {
+        rows: rows.into_iter().enumerate().collect(),
+    });
     (!column.rows.is_empty()).then_some(column)
 }
 
@@ -105,7 +102,7 @@ pub(crate) fn body_columns(cx: &Context, body: usize, count: usize) -> Vec<Colum
             let rows = (0..cx.data.joints())
                 .map(|j| (j, cx.data.w[j].col(c).iter().copied().collect()))
                 .collect();
-            let live = prune(Column { rows }, 0);
+            let live = prune(Column { rows });
             Some(match live.rows.is_empty() {
                 true => Column::on(0, vec![0.0; cx.data.rows()]),
                 false => live,

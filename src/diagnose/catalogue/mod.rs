@@ -311,43 +311,7 @@ impl<'a> Context<'a> {
                 (i, out)
             })
             .collect();
-        prune(Column { rows }, j)
-    }
-
-    /// A signal of a record with its first and second derivative, low-passed such that the second
-    /// derivative is not noise.
-    pub fn derivatives(&self, r: &Record, x: &[f64]) -> [Vec<f64>; 3] {
-        let n = x.len();
-        let w = ((0.016 / r.dt).round() as isize).max(1);
-        let wrap = r.cycle.is_some();
-        let at = |x: &[f64], i: isize| {
-            let m = n as isize;
-            x[if wrap {
-                i.rem_euclid(m)
-            } else {
-                i.clamp(0, m - 1)
-            } as usize]
-        };
-        let low = |x: &[f64]| -> Vec<f64> {
-            (0..n as isize)
-                .map(|i| {
-                    (1 - w..w)
-                        .map(|k| (w - k.abs()) as f64 * at(x, i + k))
-                        .sum::<f64>()
-                        / (w * w) as f64
-                })
-                .collect()
-        };
-        let once = low(x);
-        let twice = low(&once);
-        let value: Vec<f64> = once.iter().zip(&twice).map(|(a, b)| 2.0 * a - b).collect();
-        let first: Vec<f64> = (0..n as isize)
-            .map(|i| (at(&value, i + 1) - at(&value, i - 1)) / (2.0 * r.dt))
-            .collect();
-        let second = (0..n as isize)
-            .map(|i| (at(&value, i + 1) - 2.0 * at(&value, i) + at(&value, i - 1)) / (r.dt * r.dt))
-            .collect();
-        [value, first, second]
+        prune(Column { rows })
     }
 
     /// `M_ij δ̈` on the rows of all actuators for an acceleration `δ̈` of coordinate `j` given on all
@@ -364,7 +328,7 @@ impl<'a> Context<'a> {
                 (i, values)
             })
             .collect();
-        prune(Column { rows }, j)
+        prune(Column { rows })
     }
 }
 
@@ -398,7 +362,7 @@ pub(crate) fn projected(cx: &Context, gamma: impl Fn(&ClosedMotion) -> Vec<f64>)
 }
 
 /// Drops rows that are zero throughout.
-fn prune(mut column: Column, _j: usize) -> Column {
+fn prune(mut column: Column) -> Column {
     column
         .rows
         .retain(|(_, v)| v.iter().any(|x| x.abs() > 1e-12));
