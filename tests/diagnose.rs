@@ -167,6 +167,7 @@ fn stribeck_friction_of_another_formula() {
     );
     let f = &d.findings[0];
     assert!(f.holdout > 0.7, "shrinks {}", f.holdout);
+    assert!(f.decoys.is_some_and(|d| d < 0.1), "{:?}", f.decoys);
     // an interval about the share, and a simulated robot that follows the log more closely
     assert!(f.interval[0] <= f.explains && f.explains <= f.interval[1]);
     assert!(f.interval[1] - f.interval[0] < 0.4, "{:?}", f.interval);
@@ -231,6 +232,32 @@ fn a_force_from_outside_has_no_name() {
     assert_eq!(file["verdict"], "unknown");
     assert!(file["gap"]["rms"].as_f64().is_some_and(|v| v > 0.5));
     assert!(page::html(&d).contains("Unknown"));
+}
+
+#[test]
+fn a_load_that_sloshes_has_no_name() {
+    // a mass on a soft spring that the motion of the first joint shakes: on the lines of the motion, and
+    // no function of its state
+    let (mut x, mut u, mut last) = (0.0, 0.0, 0.0);
+    let mut force = 0.0;
+    let d = run(&mut |j, t, _, v, _| {
+        if j == 0 {
+            if t == 0.0 {
+                (x, u, last) = (0.0, 0.0, v[0]);
+            }
+            let w = 2.0 * std::f64::consts::PI * 0.9;
+            u += (-w * w * x - 0.1 * w * u) / RATE - (v[0] - last);
+            x += u / RATE;
+            last = v[0];
+            force = 0.8 * w * w * x;
+        }
+        if j == 0 { force } else { 0.4 * force }
+    });
+    assert_ne!(d.verdict, Verdict::Explained, "{:?}", claims(&d));
+    assert!(claims(&d).is_empty(), "{:?}", claims(&d));
+    // what was tried gains as much where it makes no sense
+    let decoys: Vec<f64> = d.findings.iter().filter_map(|f| f.decoys).collect();
+    assert!(decoys.iter().all(|v| *v > 0.5), "{decoys:?}");
 }
 
 fn shared(folder: &str) -> Option<PathBuf> {

@@ -32,6 +32,7 @@ fn finding(f: &Finding) -> Value {
         "explains_interval": numbers(&f.interval),
         "holdout_shrink": number(f.holdout),
         "visibility": number(f.visibility),
+        "decoys": f.decoys.map(number),
         "parameters": parameters,
         "indistinguishable_from": f.same,
         "in_the_set": f.member,

@@ -22,6 +22,7 @@
 pub mod catalogue;
 pub mod closed;
 pub mod data;
+pub mod decoy;
 pub mod evidence;
 pub mod forward;
 pub mod gap;
@@ -96,6 +97,9 @@ pub struct Finding {
     pub holdout: f64,
     /// share of the effect that the nominal model cannot absorb
     pub visibility: f64,
+    /// the most that a decoy, the effect moved in time, gains of its own over what the effect gains; of
+    /// members of the set
+    pub decoys: Option<f64>,
     /// parameters
     pub values: Vec<Value>,
     /// effects that this data cannot tell from it
@@ -399,6 +403,7 @@ pub fn of_logs(
             interval,
             holdout: m.holdout,
             visibility: m.visibility,
+            decoys: Some(m.decoys),
             values: effect.values(&cx, &c.place, &c.shape, &c.eta, &m.std),
             same,
             member: true,
@@ -430,6 +435,7 @@ pub fn of_logs(
                 interval: main.interval.map(|v| v * (1.0 - r.loss).clamp(0.0, 1.0)),
                 holdout: main.holdout * (1.0 - r.loss).clamp(0.0, 1.0),
                 visibility: of.visibility,
+                decoys: None,
                 values: effect.values(&cx, &r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
                 same: if r.weight > 0.25 {
                     vec![main.effect]

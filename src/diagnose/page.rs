@@ -170,6 +170,7 @@ fn effects(d: &Diagnosis) -> Markup {
             html! { (percent(f.explains)) @if f.member { div { small { (percent(f.interval[0])) "–" (percent(f.interval[1])) } } } },
             html! { (percent(f.holdout)) },
             html! { (percent(f.visibility)) @if f.frozen { div { small { "against the prior" } } } },
+            html! { @if let Some(d) = f.decoys { (percent(d)) } @else { "–" } },
             values(f),
             html! { @if f.same.is_empty() { "–" } @else { (f.same.join(", ").replace('_', " ")) } },
         ]
@@ -181,6 +182,7 @@ fn effects(d: &Diagnosis) -> Markup {
         "explains",
         "on holdout",
         "visible",
+        "decoys",
         "parameters (95 %)",
         "not told from",
     ];
@@ -188,10 +190,11 @@ fn effects(d: &Diagnosis) -> Markup {
     html! {
         p { "An effect is claimed from a confidence of 50 % on. " strong { "Explains" } " is the share of the gap above the \
             noise that goes when the effect is added to the others; " strong { "visible" } " the share of the effect that the \
-            nominal model cannot absorb by other parameters." }
-        (table(&head, &[1, 6, 7], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
+            nominal model cannot absorb by other parameters; " strong { "decoys" } " the most that the effect explains of its own when it \
+            is moved in time, over what it explains in place: near 100 % it is as good as any signal." }
+        (table(&head, &[1, 7, 8], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
         @if !rest.is_empty() {
-            (details("Rivals: what else could stand in their place", table(&head, &[1, 6, 7],
+            (details("Rivals: what else could stand in their place", table(&head, &[1, 7, 8],
                 &rest.iter().map(|f| row(f)).collect::<Vec<_>>())))
         }
     }

@@ -10,6 +10,8 @@
 //!    its joints, of how that holds on holdout records, and of its share against its rivals.
 
 use super::catalogue::{Context, Effect};
+use super::data::Data;
+use super::decoy;
 use super::evidence::{Evidence, Fit, Projected};
 use super::gap;
 use super::search::{Candidate, best_shape};
@@ -48,6 +50,8 @@ pub struct Member {
     pub holdout: f64,
     /// share of the effect's energy that the nominal model cannot absorb
     pub visibility: f64,
+    /// the most that a decoy gains of its own, over what the effect gains
+    pub decoys: f64,
     /// rivals by falling weight
     pub rivals: Vec<Rival>,
     /// standard deviations of the coefficients
@@ -105,8 +109,10 @@ const LEAST_SHARE: f64 = 0.05;
 const LEAST_OF_ALL: f64 = 0.012;
 /// Gap per row of a joint, in noise variances, in which an effect can be found at all.
 const LEAST_GAP: f64 = 0.15;
-/// Fall of the gap on its joints per row of holdout records over that of fitted ones, at least.
-const HELD: f64 = 0.4;
+/// Fall of the residual on holdout records over the fall that the fit predicts, at least.
+const HELD: f64 = 0.5;
+/// What a decoy may gain beyond what it shares with the effect, over what the effect gains.
+const DECOY: f64 = 0.2;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
 
@@ -535,6 +541,7 @@ fn judge(
     let rows = data.fitted as f64;
     let free = data.parameters.len() as f64;
     let c = &set[i];
+    let effect = &st.effects[c.effect];
     let rest = others(set, i);
     let (f0, r0) = st.fit(&rest);
     let (f1, r1) = st.fit(set);
@@ -668,8 +675,8 @@ fn judge(
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
-    // what explains next to nothing, or far less where it was not fitted, is no finding; nor is
-    // anything where the gap without it is what a sound model leaves
+    // what explains next to nothing is no finding; nor is anything where the gap without it is what a
+    // sound model leaves
     let matters = match frozen {
         true => 1.0,
         false => {
@@ -678,19 +685,22 @@ fn judge(
                 joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
             };
             let seen = (over(&without) - over(after)) / over(&without).max(1e-9);
-            let held_up = match held {
-                0 => 1.0,
-                _ => (hw - ha) / held as f64 / ((w - a) / rows).max(1e-9),
-            };
             let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
             logistic((seen - LEAST_SHARE) / 0.01)
                 * logistic((explains - LEAST_OF_ALL) / 0.003)
-                * logistic((held_up - HELD) / 0.05)
                 * logistic((there - LEAST_GAP) / 0.02)
         }
     };
+    let predicted = match frozen || effect.remembers() {
+        true => 1.0,
+        false => predicts(data, &r0, &r1),
+    };
+    let columns = effect.columns(st.cx, &c.place, &c.shape, false);
+    let decoys = decoy::largest(st.evidence, &columns, &c.eta, &beside);
     let together = size
         * matters
+        * logistic((predicted - HELD) / 0.05)
+        * logistic((DECOY - decoys) / 0.03)
         * logistic((share - 0.55) / 0.07).max(alone)
         * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07));
     Member {
@@ -700,10 +710,30 @@ fn judge(
         explains: explains.clamp(0.0, 1.0),
         holdout: holdout.clamp(-1.0, 1.0),
         visibility: (quad(&c.projected.s) / quad(&c.projected.raw).max(1e-300)).clamp(0.0, 1.0),
+        decoys,
         rivals,
         std: Vec::new(),
         frozen,
     }
+}
+
+/// By how much the residual falls on holdout records over the fall that is predicted, `‖Δ‖²` for a fit that
+/// takes `Δ = r₀ − r₁` away: 1 where just this is there, `2s − 1` where `s` times as much is, negative
+/// where something else is. A prediction of next to nothing is taken as kept.
+fn predicts(data: &Data, r0: &[Vec<f64>], r1: &[Vec<f64>]) -> f64 {
+    let rows = data.fitted..data.rows();
+    if rows.is_empty() {
+        return 1.0;
+    }
+    let nothing = 0.02 * rows.len() as f64;
+    let taken: f64 = r0
+        .iter()
+        .zip(r1)
+        .flat_map(|(a, b)| a[rows.clone()].iter().zip(&b[rows.clone()]))
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum();
+    let fall = energy(r0, rows.clone()) - energy(r1, rows);
+    (fall + nothing) / (taken + nothing)
 }
 
 /// Effects that are the same thing by nature: an alias does not take confidence.

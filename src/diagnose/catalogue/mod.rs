@@ -109,6 +109,11 @@ pub trait Effect: Sync {
     fn hides(&self) -> bool {
         false
     }
+    /// Whether it depends on what went on before a record began, so that coefficients of one record
+    /// need not fit another.
+    fn remembers(&self) -> bool {
+        false
+    }
     /// Columns, per unit of the coefficients. A `draft` may leave out rows of lesser weight.
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column>;
     /// Whether coefficients make physical sense.

@@ -36,6 +36,11 @@ impl Effect for ThermalFriction {
         k == 0
     }
 
+    fn remembers(&self) -> bool {
+        // how warm a record begins
+        true
+    }
+
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
         let j = place[0];
         // warmth from the power of friction; it lasts from record to record in the order of the

@@ -1,0 +1,73 @@
+//! Decoys: what columns of no meaning would explain.
+//!
+//! The columns of an effect, moved cyclically in time within every record by a share of its length, keep
+//! their size, their spectrum and their autocorrelation, and lose what ties them to the motion. Fitted in
+//! the place of the effect, with the same number of coefficients and beside the same other effects, they
+//! gain what any flexible enough signal gains from a residual that is not white:
+//!
+//! ```text
+//! z_d(t) = z(t + f_d T mod T)        gain_d = J(others) − J(others, z_d),   d = 1 … D
+//! ```
+//!
+//! Shifts near nothing and near half a record are left out: there a column of a motion of odd harmonics is
+//! itself, up to its sign. This is the circular-shift null of time series (Theiler et al. 1992 call such
+//! series surrogates).
+
+use super::data::{Column, Data};
+use super::evidence::{Evidence, Projected};
+
+/// Number of decoys of an effect.
+pub const COUNT: usize = 12;
+
+/// Shares of a record by which decoys are moved, within 0.1 to 0.4 and 0.6 to 0.9.
+fn shifts() -> impl Iterator<Item = f64> {
+    (0..COUNT).map(|d| {
+        let golden = (0.618_033_988_749_895 * (d as f64 + 1.0)).fract();
+        let near = 0.1 + 0.3 * golden;
+        if d % 2 == 0 { near } else { 1.0 - near }
+    })
+}
+
+/// A column moved cyclically within every record.
+fn moved(data: &Data, column: &Column, share: f64) -> Column {
+    let rows = column.rows.iter().map(|(j, v)| {
+        let mut v = v.clone();
+        for k in 0..data.records.len() {
+            let piece = &mut v[data.span(k)];
+            let by = (share * piece.len() as f64) as usize;
+            piece.rotate_left(by);
+        }
+        (*j, v)
+    });
+    Column {
+        rows: rows.collect(),
+    }
+}
+
+/// The most that a decoy of an effect with these columns and coefficients gains of its own, over what
+/// the effect gains beside the others:
+///
+/// ```text
+/// max over d:  gain_d / gain − overlap_d
+/// ```
+///
+/// A slow column resembles itself when it is moved; what its decoy takes for that reason, the overlap, is
+/// no evidence against it. Near 0 for an effect that is there, 1 and more for one that is as good as any.
+pub fn largest(evidence: &Evidence, columns: &[Column], eta: &[f64], beside: &[&Projected]) -> f64 {
+    let of = |share| -> Vec<Column> {
+        let of = |c| moved(evidence.data, c, share);
+        columns.iter().map(of).collect()
+    };
+    let own = evidence.project(columns);
+    let before = evidence.fit(beside).gain;
+    let gain = |effect: &Projected| {
+        let mut set = beside.to_vec();
+        set.push(effect);
+        evidence.fit(&set).gain - before
+    };
+    let least = gain(&own).max(1e-9);
+    let sets: Vec<Vec<Column>> = shifts().map(of).collect();
+    let decoys = evidence.project_all(&sets);
+    let excess = |d: &Projected| gain(d) / least - evidence.overlap(&own, eta, d);
+    decoys.iter().map(excess).fold(0.0, f64::max)
+}
