@@ -143,7 +143,7 @@ fn summary(d: &Diagnosis) -> Markup {
 fn values(f: &Finding) -> Markup {
     html! {
         @for v in &f.values {
-            div {
+            div class="value" {
                 (v.name.replace('_', " ")) " " (significant(v.value, 4))
                 @if let Some(s) = v.std { @if s > 0.0 { " ± " (significant(1.96 * s, 2)) } }
                 " " (v.unit)

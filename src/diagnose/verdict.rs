@@ -112,7 +112,7 @@ const LEAST_GAP: f64 = 0.15;
 /// Fall of the residual on holdout records over the fall that the fit predicts, at least.
 const HELD: f64 = 0.5;
 /// What a decoy may gain beyond what it shares with the effect, over what the effect gains.
-const DECOY: f64 = 0.2;
+const DECOY: f64 = 0.22;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
 

@@ -185,7 +185,8 @@ tbody tr:last-child td{border-bottom:0}
 th:last-child,td:last-child{padding-right:0}
 .number{text-align:right;white-space:nowrap}
 th.number{white-space:normal}
-td .code{display:block;min-width:220px}
+td .code{display:block;min-width:190px}
+.value{min-width:210px}
 code,.code{font:12.5px/1.45 ui-monospace,SFMono-Regular,Menlo,Consolas,'Liberation Mono',monospace;overflow-wrap:anywhere}
 pre{font:12.5px/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,'Liberation Mono',monospace;background:var(--page);\
 border-radius:6px;padding:12px 14px;margin:0 0 10px;white-space:pre-wrap;overflow-wrap:anywhere}
