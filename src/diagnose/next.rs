@@ -81,13 +81,11 @@ pub fn propose(
         .map(|t| t.overlap(evidence, cx, FINE.shapes).unwrap_or(1.0))
         .collect();
     // invisible with one shape only is not invisible
-    let keep: Vec<bool> = (0..targets.len())
-        .map(|i| i < first_hidden || now[i] > 1.0 - INVISIBLE)
-        .collect();
-    let mut kept = keep.iter();
-    targets.retain(|_| *kept.next().unwrap_or(&false));
-    let mut kept = keep.iter();
-    now.retain(|_| *kept.next().unwrap_or(&false));
+    (targets, now) = std::iter::zip(targets, now)
+        .enumerate()
+        .filter(|(i, (_, now))| *i < first_hidden || *now > 1.0 - INVISIBLE)
+        .map(|(_, both)| both)
+        .unzip();
     if targets.is_empty() {
         return None;
     }
@@ -115,24 +113,14 @@ pub fn propose(
     // pairs in their order, then what can be shown best
     let mut order: Vec<usize> = (0..first_hidden).filter(helps).collect();
     let mut rest: Vec<usize> = (first_hidden..targets.len()).filter(shows).collect();
-    rest.sort_by(|a, b| {
-        lowest[*a]
-            .map(|l| l.0)
-            .partial_cmp(&lowest[*b].map(|l| l.0))
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
+    let overlap = |i: usize| lowest[i].map_or(1.0, |(o, _)| o);
+    rest.sort_by(|a, b| overlap(*a).total_cmp(&overlap(*b)));
     order.extend(rest.first());
+    let tries = settings.next_tries / order.len().max(1);
     for i in order {
         let (overlap, m) = lowest[i]?;
         let begin = (overlap, choice[m].clone());
-        let best = improved(
-            &trial,
-            &motions,
-            &targets[i],
-            begin,
-            settings.next_tries,
-            &mut rng,
-        );
+        let best = improved(&trial, &motions, &targets[i], begin, tries, &mut rng);
         // predicted at the rate of the records
         let mut of = vec![&targets[i]];
         of.extend(&targets[first_hidden..]);
