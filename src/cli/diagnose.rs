@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
     long_about = "Diagnose the gap between a model and its robot: where it lies, which effect causes it, how far it shrinks \
                   once that effect is added, and what to run next.\n\nReads experiment.toml (robot, logs, which are fitted and \
                   which only predicted). Writes diagnosis.json and report.html; robot.toml, robot.urdf and robot.xml (MuJoCo) \
-                  with the improved model; next.json, the motion that tells rivals apart, where there are any.",
+                  with the improved model; next.json, the motion that tells rivals apart or shows what these records cannot, of the joints or of the platform.",
     after_help = "Examples:\n  excite diagnose experiment.toml\n  excite diagnose experiment.toml --output gap --json\n  excite \
                   diagnose experiment.toml --no-next"
 )]
@@ -31,12 +31,13 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
-    /// Do not design the motion that tells rivals apart
+    /// Do not design the next motion
     #[arg(long)]
     no_next: bool,
-    /// Seconds for the design of that motion
-    #[arg(long, value_name = "SECONDS", default_value_t = 6.0)]
-    next_seconds: f64,
+    /// Random steps by which the best design of that motion is improved; counted, so that the same seed
+    /// gives the same motion
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    next_tries: usize,
     /// Seed of the random starts of that design
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -49,14 +50,14 @@ pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let experiment = Experiment::read(&args.experiment)?;
     let serial = experiment.plant.mechanism().is_none();
-    let mut names = vec!["diagnosis.json", "report.html", "robot.urdf"];
+    let mut names = vec!["diagnosis.json", "report.html", "robot.urdf", "next.json"];
     if serial {
-        names.extend(["robot.toml", "robot.xml", "next.json"]);
+        names.extend(["robot.toml", "robot.xml"]);
     }
     let paths = prepare_dir(&args.output, &names, args.force)?;
     let settings = Settings {
         next: !args.no_next,
-        next_seconds: args.next_seconds.clamp(0.0, 600.0),
+        next_tries: args.next_tries.min(10_000),
         seed: args.seed,
     };
     // drawn only where standard error is a terminal
@@ -78,14 +79,14 @@ pub fn run(args: Args) -> Result<()> {
     write(&paths[2], args.force, &urdf(&robot))?;
     if serial {
         write(
-            &paths[3],
+            &paths[4],
             args.force,
             &improve::toml(&robot, &d, "robot.urdf"),
         )?;
-        write(&paths[4], args.force, &improve::mujoco(&robot, &d))?;
-        if let Some(n) = &d.next {
-            n.trajectory.write(&paths[5], args.force)?;
-        }
+        write(&paths[5], args.force, &improve::mujoco(&robot, &d))?;
+    }
+    if let Some(n) = &d.next {
+        n.trajectory.write(&paths[3], args.force)?;
     }
     if args.json {
         return print(&pretty(&report));
@@ -131,9 +132,7 @@ pub fn run(args: Args) -> Result<()> {
         let _ = writeln!(
             out,
             "\nnext: {} separates {} (overlap {} now, {} predicted)",
-            paths
-                .last()
-                .map_or(String::new(), |p| p.display().to_string()),
+            paths[3].display(),
             n.separates.join(" from "),
             percent(n.overlap[0]),
             percent(n.overlap[1])

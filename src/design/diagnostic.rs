@@ -100,7 +100,7 @@ pub fn diagnostic_set(
 }
 
 /// The limits of a robot times a fraction, for all time.
-struct Checker<'a> {
+pub(crate) struct Checker<'a> {
     plant: &'a Plant,
     /// coordinates with limits times the fraction
     robot: Robot,
@@ -109,7 +109,8 @@ struct Checker<'a> {
 }
 
 impl<'a> Checker<'a> {
-    fn new(plant: &'a Plant, robot: &Robot, derate: f64) -> Self {
+    /// Of `robot`, the coordinates of `plant` with their limits.
+    pub(crate) fn new(plant: &'a Plant, robot: &Robot, derate: f64) -> Self {
         let mut robot = robot.clone();
         for joint in &mut robot.joints {
             let l = &mut joint.limits;
@@ -160,7 +161,11 @@ impl<'a> Checker<'a> {
         }))
     }
 
-    fn holds(&self, fourier: &Fourier) -> Result<bool> {
+    /// Whether a motion keeps all of them.
+    ///
+    /// # Errors
+    /// A motion of another robot.
+    pub(crate) fn holds(&self, fourier: &Fourier) -> Result<bool> {
         if !self.sampled(fourier)? {
             return Ok(false);
         }

@@ -34,6 +34,32 @@ pub struct Projected {
     pub b: Vec<f64>,
 }
 
+impl Projected {
+    /// `ηᵀSη` and `ηᵀZᵀZη`: energy of the effect that is left, and all of it.
+    pub fn energy(&self, eta: &[f64]) -> (f64, f64) {
+        let k = self.z.len().min(eta.len());
+        let quad = |m: &Mat<f64>| -> f64 {
+            (0..k)
+                .map(|i| (0..k).map(|l| eta[i] * m[(i, l)] * eta[l]).sum::<f64>())
+                .sum()
+        };
+        (quad(&self.s), quad(&self.raw))
+    }
+
+    /// Share of the effect that the nominal model cannot absorb; with unknown coefficients that of all
+    /// columns together.
+    pub fn visibility(&self, eta: Option<&[f64]>) -> f64 {
+        let (left, all) = match eta {
+            Some(eta) => self.energy(eta),
+            None => {
+                let sum = |m: &Mat<f64>| (0..self.z.len()).map(|i| m[(i, i)]).sum::<f64>();
+                (sum(&self.s), sum(&self.raw))
+            }
+        };
+        (left / all.max(1e-300)).clamp(0.0, 1.0)
+    }
+}
+
 /// A fit of a set of effects.
 #[derive(Debug, Clone, Default)]
 pub struct Fit {
@@ -375,9 +401,7 @@ impl<'a> Evidence<'a> {
     /// has taken its share: the squared cosine of the projected angle.
     pub fn overlap(&self, a: &Projected, eta: &[f64], b: &Projected) -> f64 {
         let k = a.z.len().min(eta.len());
-        let own: f64 = (0..k)
-            .map(|i| (0..k).map(|m| eta[i] * a.s[(i, m)] * eta[m]).sum::<f64>())
-            .sum();
+        let own = a.energy(eta).0;
         let cross = self.cross(b, a);
         let rhs: Vec<f64> = (0..b.z.len())
             .map(|i| (0..k).map(|m| cross[(i, m)] * eta[m]).sum())

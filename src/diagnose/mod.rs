@@ -52,8 +52,8 @@ use record::{Raw, Record};
 pub struct Settings {
     /// whether to design the next experiment where effects are not told apart
     pub next: bool,
-    /// seconds for that design
-    pub next_seconds: f64,
+    /// random steps by which that design is improved
+    pub next_tries: usize,
     /// seed of random starts
     pub seed: u64,
 }
@@ -62,7 +62,7 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             next: true,
-            next_seconds: 6.0,
+            next_tries: 64,
             seed: 1,
         }
     }
@@ -462,8 +462,11 @@ pub fn of_logs(
              assumed to be as high)"
         }
     };
+    if settings.next {
+        progress("next experiment");
+    }
     let next = match settings.next {
-        true => next::propose(plant, &data, &cx, &effects, &findings, settings)?,
+        true => next::propose(&evidence, &cx, &effects, &list, &findings, settings),
         false => None,
     };
     Ok(Diagnosis {
@@ -541,13 +544,8 @@ fn untestable(
     let names = data.plant.actuators();
     let mut out = Vec::new();
     for c in list {
-        let (mut seen, mut all) = (0.0, 0.0);
-        for i in 0..c.projected.z.len() {
-            seen += c.projected.s[(i, i)];
-            all += c.projected.raw[(i, i)];
-        }
-        let visibility = seen / f64::max(all, 1e-300);
-        if visibility < 0.01 {
+        let visibility = c.projected.visibility(None);
+        if visibility < next::INVISIBLE {
             let place: Vec<&str> = c.place.iter().map(|j| names[*j].name.as_str()).collect();
             out.push((effects[c.effect].card().name, place.join(", "), visibility));
         }

@@ -1,4 +1,4 @@
-//! What to run next: the motion that tells two effects apart.
+//! What to run next: the motion that tells two effects apart, or that shows one.
 //!
 //! Two effects look alike where their projected columns point the same way. With the effect `A` that is
 //! believed, `a = R^½ Z_A η_A`, and the columns `B` of its rival, the share of `A` that `B` can imitate is
@@ -8,271 +8,258 @@
 //! ```
 //!
 //! The distinguishable part, `(1 − overlap) aᵀa`, is the non-centrality of the test between the two:
-//! the criterion of T-optimal design (Atkinson & Fedorov 1975). Motions come from the program's own
-//! optimiser with several grids and seeds, each also run slower; the best is improved by random steps of
-//! its coefficients that keep inside all limits.
+//! the criterion of T-optimal design (Atkinson & Fedorov 1975). Where the nominal model itself absorbs an
+//! effect, it is the rival, and `overlap = 1 − visibility` (Ds-optimal design: the effect with the nominal
+//! parameters as nuisance). Motions come from the program's own optimiser with several grids and seeds,
+//! each also run slower, and from random series; the best is improved by random steps of its coefficients
+//! and its period that keep inside all limits. All is limited by counts: the same seed gives the same
+//! motion whatever the number of threads.
+
+mod motions;
+mod trial;
 
 use super::catalogue::{Context, Effect};
-use super::data::Data;
 use super::evidence::Evidence;
-use super::record::Record;
+use super::search::Candidate;
 use super::{Finding, Settings};
-use crate::design::{Settings as Design, design, with_assumed_limits};
-use crate::dynamics::Tree;
-use crate::error::Result;
-use crate::identifiability::certificate;
-use crate::plant::Plant;
-use crate::trajectory::{Fourier, Grid, Trajectory};
-use rand::{Rng, SeedableRng};
+use crate::trajectory::Trajectory;
+use motions::Motions;
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use rayon::prelude::*;
+use trial::{COARSE, FINE, Placed, Target, Trial};
+
+/// Name of the nominal model where it stands in the place of a rival.
+pub const NOMINAL: &str = "nominal_model";
+/// Visibility below which an effect is invisible in a motion.
+pub const INVISIBLE: f64 = 0.01;
+/// Overlap that is good enough.
+const APART: f64 = 0.02;
+/// Part of the present overlap that a motion must come below to be worth a run.
+const BETTER: f64 = 0.95;
+/// Overlap of a pair in all first motions from which on no motion tells it apart.
+const ALIAS: f64 = 0.995;
+/// Random steps that are judged side by side.
+const BATCH: usize = 8;
+/// Size of the first random steps, their decay, and the smallest.
+const STEP: [f64; 3] = [0.3, 0.8, 0.05];
+/// Rivals of an effect, and invisible effects, that are looked at.
+const RIVALS: usize = 2;
+const HIDDEN: usize = 8;
 
 /// The next experiment.
 #[derive(Debug, Clone)]
 pub struct Proposal {
-    /// the two effects
+    /// the two effects; an effect and [`NOMINAL`] where it is invisible in the records at hand
     pub separates: Vec<&'static str>,
-    /// the motion
+    /// the motion, of the joints of a serial robot or the platform of a parallel one
     pub trajectory: Trajectory,
+    /// units of its coordinates
+    pub units: Vec<&'static str>,
     /// overlap in the records at hand, and predicted for the motion
     pub overlap: [f64; 2],
     /// why this pair
     pub why: String,
 }
 
-/// Samples of a trial motion.
-const SAMPLES: usize = 1500;
-
-struct Trial<'a> {
-    plant: &'a Plant,
-    data: &'a Data<'a>,
-    cx: &'a Context<'a>,
-    a: (&'a dyn Effect, &'a Finding),
-    b: (&'a dyn Effect, &'a Finding),
-}
-
-impl Trial<'_> {
-    /// A record of three periods of a motion, without torques.
-    fn record(&self, motion: &Fourier) -> Record {
-        let n = motion.dof();
-        let dt = (motion.period / SAMPLES as f64).max(self.data.records[0].dt);
-        let count = (motion.period / dt).round() as usize;
-        let dt = motion.period / count as f64;
-        let mut x = crate::dynamics::Samples::zeros(n, count);
-        let (mut q, mut qd, mut qdd) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        for i in 0..count {
-            motion.evaluate(i as f64 * dt, [&mut q, &mut qd, &mut qdd]);
-            for j in 0..n {
-                x.q[j * count + i] = q[j];
-                x.qd[j * count + i] = qd[j];
-                x.qdd[j * count + i] = qdd[j];
-            }
-        }
-        Record {
-            name: "next".into(),
-            fit: true,
-            dt,
-            count,
-            cycle: Some(count),
-            actuators: x.clone(),
-            x,
-            tau: vec![0.0; n * count],
-            position_noise: vec![0.0; n],
-            band: 20.0,
-            order: 0,
-            remarks: Vec::new(),
-        }
-    }
-
-    /// Overlap of the two effects in a motion; `None` where the believed effect hardly shows.
-    fn overlap(&self, motion: &Fourier) -> Option<f64> {
-        let record = self.record(motion);
-        let noise = Some(self.data.noise.clone());
-        let data = Data::with_noise(self.plant, vec![record], noise).ok()?;
-        let evidence = Evidence::new(&data, 1.0);
-        let phi = self.cx.phi[..data.parameters.len()].to_vec();
-        let cx = Context::new(&data, phi).ok()?;
-        let of = |(effect, f): (&dyn Effect, &Finding)| {
-            let columns = effect.columns(&cx, &f.place, &f.shape, false);
-            (!columns.is_empty()).then(|| evidence.project(&columns))
-        };
-        let (a, b) = (of(self.a)?, of(self.b)?);
-        let eta = &self.a.1.eta;
-        if eta.len() != a.z.len() {
-            return None;
-        }
-        let k = eta.len();
-        let seen: f64 = (0..k)
-            .map(|i| (0..k).map(|m| eta[i] * a.s[(i, m)] * eta[m]).sum::<f64>())
-            .sum();
-        // a motion in which the effect is lost in the noise separates nothing
-        (seen > 0.05 * data.fitted as f64).then(|| evidence.overlap(&a, eta, &b))
-    }
-}
-
-/// Designs the next motion, where the first two findings are not told apart.
-///
-/// # Errors
-/// A robot that cannot be moved within its limits.
+/// Designs the next motion, where the first findings are not told apart or an effect is invisible in
+/// the records at hand. `None` where there is nothing to separate, or no motion that does.
 pub fn propose(
-    plant: &Plant,
-    data: &Data,
+    evidence: &Evidence,
     cx: &Context,
     effects: &[Box<dyn Effect>],
+    list: &[Candidate],
     findings: &[Finding],
     settings: &Settings,
-) -> Result<Option<Proposal>> {
-    let Plant::Serial(robot) = plant else {
-        return Ok(None);
-    };
-    let Some(main) = findings.iter().find(|f| f.member && f.confidence > 0.02) else {
-        return Ok(None);
-    };
-    let rival = findings
-        .iter()
-        .find(|f| !f.member && f.effect != main.effect && f.confidence > 0.08 * main.confidence);
-    let Some(rival) = rival else {
-        return Ok(None);
-    };
-    let of = |f: &Finding| {
-        effects
-            .iter()
-            .find(|e| e.card().name == f.effect)
-            .map(|e| e.as_ref())
-    };
-    let (Some(a), Some(b)) = (of(main), of(rival)) else {
-        return Ok(None);
-    };
-    let trial = Trial {
-        plant,
-        data,
-        cx,
-        a: (a, main),
-        b: (b, rival),
-    };
-    let evidence = Evidence::new(data, 1.0);
-    let project =
-        |e: &dyn Effect, f: &Finding| evidence.project(&e.columns(cx, &f.place, &f.shape, false));
-    let now = evidence.overlap(&project(a, main), &main.eta, &project(b, rival));
-    drop(evidence);
-
-    let begin = Instant::now();
-    let left = || settings.next_seconds - begin.elapsed().as_secs_f64();
-    let limited = with_assumed_limits(robot);
-    let tree = Tree::new(&limited);
-    let mut best: Option<(f64, Trajectory)> = None;
-    let mut consider = |trajectory: Trajectory| {
-        if let Some(o) = trial.overlap(&trajectory.fourier)
-            && best.as_ref().is_none_or(|b| o < b.0)
-        {
-            best = Some((o, trajectory));
-        }
-    };
-    for (k, grid) in [Grid::Odd, Grid::Full].into_iter().enumerate() {
-        let wanted = Design {
-            harmonics: 5,
-            period: 8.0,
-            periods: 3,
-            grid,
-            seed: settings.seed + k as u64,
-            starts: Some(1),
-            time_limit: Some((settings.next_seconds / 4.0).max(0.5)),
-            ends: crate::trajectory::Ends::Free,
-            ..Design::default()
-        };
-        let Ok(found) = design(robot, &wanted, &AtomicBool::new(false), &|_| {}) else {
+) -> Option<Proposal> {
+    let mut targets = pairs(effects, findings);
+    let first_hidden = targets.len();
+    targets.extend(hidden(effects, list, findings));
+    let mut now: Vec<f64> = targets
+        .par_iter()
+        .with_max_len(1)
+        .map(|t| t.overlap(evidence, cx, FINE.shapes).unwrap_or(1.0))
+        .collect();
+    // invisible with one shape only is not invisible
+    (targets, now) = std::iter::zip(targets, now)
+        .enumerate()
+        .filter(|(i, (_, now))| *i < first_hidden || *now > 1.0 - INVISIBLE)
+        .map(|(_, both)| both)
+        .unzip();
+    if targets.is_empty() {
+        return None;
+    }
+    let data = evidence.data;
+    let trial = Trial { data, phi: &cx.phi };
+    let motions = Motions::new(data);
+    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+    let choice = motions.first(settings.seed, &mut rng);
+    let all: Vec<&Target> = targets.iter().collect();
+    let judged: Vec<Vec<Option<f64>>> = choice
+        .par_iter()
+        .with_max_len(1)
+        .map(|t| trial.overlaps(&t.fourier, COARSE, &all))
+        .collect();
+    // the lowest overlap of every target, and in which motion
+    let lowest: Vec<Option<(f64, usize)>> = (0..targets.len())
+        .map(|i| {
+            let seen = judged.iter().enumerate();
+            let seen = seen.filter_map(|(m, row)| Some((row[i]?, m)));
+            seen.min_by(|a, b| a.0.total_cmp(&b.0))
+        })
+        .collect();
+    let helps = |i: &usize| lowest[*i].is_some_and(|(o, _)| o < ALIAS);
+    let shows = |i: &usize| lowest[*i].is_some_and(|(o, _)| o < 1.0 - 2.0 * INVISIBLE);
+    // pairs in their order, then what can be shown best
+    let mut order: Vec<usize> = (0..first_hidden).filter(helps).collect();
+    let mut rest: Vec<usize> = (first_hidden..targets.len()).filter(shows).collect();
+    let overlap = |i: usize| lowest[i].map_or(1.0, |(o, _)| o);
+    rest.sort_by(|a, b| overlap(*a).total_cmp(&overlap(*b)));
+    order.extend(rest.first());
+    let tries = settings.next_tries / order.len().max(1);
+    for i in order {
+        let (overlap, m) = lowest[i]?;
+        let begin = (overlap, choice[m].clone());
+        let best = improved(&trial, &motions, &targets[i], begin, tries, &mut rng);
+        // predicted at the rate of the records
+        let mut of = vec![&targets[i]];
+        of.extend(&targets[first_hidden..]);
+        let predicted = trial.overlaps(&best.fourier, FINE, &of);
+        let Some(overlap) = predicted[0].filter(|o| *o < BETTER * now[i]) else {
             continue;
         };
-        for slower in [1.0, 2.5, 6.0] {
-            let mut t = found.trajectory.clone();
-            t.fourier.period *= slower;
-            consider(t);
-        }
-    }
-    // and from the positions of the records, small enough to be inside all limits
-    let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-    for period in [4.0, 10.0, 24.0] {
-        let joints = data
-            .range
-            .iter()
-            .map(|[a, b]| {
-                let mut draw = |h: f64| (b - a) / 3.0 / h * rng.random_range(-1.0..1.0);
-                crate::trajectory::Series {
-                    constant: 0.5 * (a + b),
-                    sin: [1.0, 3.0, 5.0, 7.0].map(&mut draw).to_vec(),
-                    cos: [1.0, 3.0, 5.0, 7.0].map(&mut draw).to_vec(),
-                }
-            })
+        let also = (first_hidden..targets.len()).zip(&predicted[1..]);
+        let also: Vec<&Target> = also
+            .filter(|(k, o)| *k != i && o.is_some_and(|o| o < 1.0 - 2.0 * INVISIBLE))
+            .map(|(k, _)| &targets[k])
             .collect();
-        let mut fourier = Fourier::new(period, vec![1, 3, 5, 7], joints)?;
-        for _ in 0..16 {
-            if certificate(&limited, &tree, &fourier).is_ok_and(|c| c.satisfied) {
-                let mut t = Trajectory::new(&limited, fourier);
-                t.periods = 3;
-                t.grid = Grid::Odd;
-                consider(t);
-                break;
-            }
-            for s in &mut fourier.joints {
-                s.sin.iter_mut().chain(&mut s.cos).for_each(|v| *v *= 0.8);
-            }
-        }
+        let overlap = [now[i], overlap];
+        return Some(Proposal {
+            separates: names(&targets[i]),
+            why: why(&targets[i], &also, overlap, data),
+            trajectory: best,
+            units: motions.units(),
+            overlap,
+        });
     }
-    let Some((mut lowest, mut trajectory)) = best else {
-        return Ok(None);
+    None
+}
+
+/// The effect that is believed most with each of its rivals.
+fn pairs<'a>(effects: &'a [Box<dyn Effect>], findings: &'a [Finding]) -> Vec<Target<'a>> {
+    let Some(main) = findings.iter().find(|f| f.member && f.confidence > 0.02) else {
+        return Vec::new();
     };
-    // random steps inside the limits
-    let mut step = 0.3;
-    let mut tries = 0;
-    while left() > 0.0 && tries < 60 && lowest > 0.02 {
-        tries += 1;
-        let mut t = trajectory.clone();
-        for s in &mut t.fourier.joints {
-            let size = s
-                .sin
-                .iter()
-                .chain(&s.cos)
-                .fold(0.0f64, |m, v| m.max(v.abs()));
-            for v in s.sin.iter_mut().chain(&mut s.cos) {
-                *v += step * size * rng.random_range(-1.0..1.0);
-            }
-        }
-        // back inside: smaller about the same middle until all limits hold
-        let mut inside = false;
-        for _ in 0..4 {
-            if certificate(&limited, &tree, &t.fourier).is_ok_and(|c| c.satisfied) {
-                inside = true;
-                break;
-            }
-            for s in &mut t.fourier.joints {
-                s.sin.iter_mut().chain(&mut s.cos).for_each(|v| *v *= 0.8);
-            }
-        }
-        match inside.then(|| trial.overlap(&t.fourier)).flatten() {
-            Some(o) if o < lowest => (lowest, trajectory) = (o, t),
-            _ => step = f64::max(0.97 * step, 0.05),
+    let near = |f: &&Finding| {
+        !f.member && f.effect != main.effect && f.confidence > 0.08 * main.confidence
+    };
+    let placed = |f: &'a Finding| Placed::of_finding(effects, f);
+    findings
+        .iter()
+        .filter(near)
+        .take(RIVALS)
+        .filter_map(|rival| Some(Target::Pair(placed(main)?, placed(rival)?)))
+        .collect()
+}
+
+/// Effects that the nominal model absorbs: members that show in nothing but its parameters, then those
+/// of the catalogue at the place where they come nearest to the gap.
+fn hidden<'a>(
+    effects: &'a [Box<dyn Effect>],
+    list: &'a [Candidate],
+    findings: &'a [Finding],
+) -> Vec<Target<'a>> {
+    let invisible = |f: &&Finding| f.member && f.visibility < INVISIBLE;
+    let members = findings.iter().filter(invisible);
+    let mut all: Vec<Target> = members
+        .filter_map(|f| Some(Target::Hidden(Placed::of_finding(effects, f)?)))
+        .collect();
+    if !all.is_empty() {
+        return all;
+    }
+    let mut known: Vec<usize> = Vec::new();
+    for c in list {
+        let absorbed = c.projected.visibility(None) < INVISIBLE;
+        if absorbed && !known.contains(&c.effect) && all.len() < HIDDEN {
+            known.push(c.effect);
+            all.push(Target::Hidden(Placed::of_candidate(effects, c)));
         }
     }
-    if lowest >= now {
-        return Ok(None);
+    all
+}
+
+/// Random steps from a motion, in batches of which the best counts; steps shrink where none is better.
+fn improved(
+    trial: &Trial,
+    motions: &Motions,
+    target: &Target,
+    begin: (f64, Trajectory),
+    tries: usize,
+    rng: &mut ChaCha8Rng,
+) -> Trajectory {
+    let (mut lowest, mut best) = begin;
+    let [mut step, decay, smallest] = STEP;
+    for _ in 0..tries.div_ceil(BATCH) {
+        if lowest < APART {
+            break;
+        }
+        let batch: Vec<_> = (0..BATCH)
+            .map(|_| motions.changed(&best, step, rng))
+            .collect();
+        let found = batch
+            .into_par_iter()
+            .with_max_len(1)
+            .filter_map(|motion| {
+                let t = motions.kept(motion)?;
+                let o = trial.overlaps(&t.fourier, COARSE, &[target])[0]?;
+                Some((o, t))
+            })
+            .collect::<Vec<_>>()
+            .into_iter()
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        match found {
+            Some((o, t)) if o < lowest => (lowest, best) = (o, t),
+            _ => step = smallest.max(decay * step),
+        }
     }
-    Ok(Some(Proposal {
-        separates: vec![main.effect, rival.effect],
-        why: format!(
-            "{} on {} and {} explain the records at hand almost equally well; in the proposed motion {} could \
-             imitate {:.0} % of it instead of {:.0} %",
-            main.title,
-            match main.joints.is_empty() {
-                true => "the whole robot".to_string(),
-                false => main.joints.join(", "),
-            },
-            rival.title,
-            rival.title,
-            100.0 * lowest,
-            100.0 * now
-        ),
-        trajectory,
-        overlap: [now, lowest],
-    }))
+    best
+}
+
+fn names(target: &Target) -> Vec<&'static str> {
+    match target {
+        Target::Pair(a, b) => vec![a.effect.card().name, b.effect.card().name],
+        Target::Hidden(a) => vec![a.effect.card().name, NOMINAL],
+    }
+}
+
+fn why(target: &Target, also: &[&Target], overlap: [f64; 2], data: &super::Data) -> String {
+    let actuators = data.plant.actuators();
+    let joints: Vec<String> = actuators.iter().map(|j| j.name.clone()).collect();
+    let [now, then] = overlap.map(|o| 100.0 * o);
+    let mut text = match target {
+        Target::Pair(a, b) => {
+            let (a, title) = (a.words(&joints), b.effect.card().title);
+            format!(
+                "{a} and {title} explain the records at hand almost equally well; in the proposed motion {title} \
+                 could imitate {then:.0} % of it instead of {now:.0} %"
+            )
+        }
+        Target::Hidden(a) => {
+            let a = a.words(&joints);
+            format!(
+                "{a} cannot be seen in the records at hand, where other parameters of the nominal model imitate \
+                 {now:.1} % of it; in the proposed motion {then:.0} %"
+            )
+        }
+    };
+    let others: Vec<String> = also
+        .iter()
+        .map(|t| match t {
+            Target::Pair(a, _) | Target::Hidden(a) => a.words(&joints),
+        })
+        .collect();
+    if !others.is_empty() {
+        text += &format!("; it would also show {}", others.join(", "));
+    }
+    text
 }

@@ -1,5 +1,6 @@
 //! The report: where the gap lies, what causes it, how far it shrinks, what to run next.
 
+use super::next::Proposal;
 use super::{Diagnosis, Finding, Verdict};
 use crate::report::format::{percent, significant};
 use crate::report::html::{Section, Tone, details, figure, legend, page, table, tiles};
@@ -521,14 +522,52 @@ fn simulated(d: &Diagnosis) -> Markup {
     }
 }
 
+/// The coordinates of the proposed motion over a period.
+fn proposed(n: &Proposal) -> Markup {
+    const POINTS: usize = 400;
+    let motion = n.trajectory.fourier.motion(POINTS);
+    let step = n.trajectory.fourier.period / POINTS as f64;
+    let curves = motion.q.chunks_exact(POINTS).zip(&n.trajectory.joints);
+    let panels = curves
+        .zip(&n.units)
+        .map(|((q, name), of)| {
+            let points = q.iter().enumerate().map(|(i, q)| [i as f64 * step, *q]);
+            Panel {
+                title: name.clone(),
+                x: Axis::linear("time, s"),
+                y: Axis::linear(unit("position", of)),
+                series: vec![Series::line(points.collect(), Colour::BLUE)],
+                ..Panel::default()
+            }
+        })
+        .collect();
+    let svg = Figure {
+        description: "coordinates of the proposed motion over a period".into(),
+        width: Figure::WIDTH,
+        height: 110.0,
+        columns: n.units.len().clamp(1, 3),
+        column_titles: Vec::new(),
+        row_titles: Vec::new(),
+        share_x: false,
+        panels,
+    }
+    .svg();
+    figure(
+        svg,
+        html! { "The proposed motion: joints of a serial robot, the platform of a parallel one." },
+    )
+}
+
 fn next(d: &Diagnosis) -> Markup {
     html! {
         @match &d.next {
             Some(n) => {
                 p { (n.why) "." }
                 p { "The motion is in " code { "next.json" } ": period " (significant(n.trajectory.fourier.period, 3)) " s, run "
-                    (n.trajectory.periods) " times. Overlap " (percent(n.overlap[0])) " in the present records, " (percent(n.overlap[1]))
-                    " predicted." }
+                    (n.trajectory.periods) " times, inside all limits of the robot file. Overlap " (percent(n.overlap[0]))
+                    " in the present records, " (percent(n.overlap[1])) " predicted. "
+                    code { "excite identifiability" } " shows how far it uses each limit." }
+                (proposed(n))
             }
             None => {
                 p { @if d.findings.iter().any(|f| f.member && f.confidence >= 0.5) {

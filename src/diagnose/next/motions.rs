@@ -1,0 +1,181 @@
+//! Motions to choose from, all of them inside the limits: of the joints of a serial robot, of the
+//! platform of a parallel one.
+
+use crate::design::diagnostic::Checker;
+use crate::design::{Settings as Design, design_plant, with_assumed_limits};
+use crate::diagnose::data::Data;
+use crate::plant::Plant;
+use crate::robot::Robot;
+use crate::trajectory::{Ends, Fourier, Grid, Series, Trajectory};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+
+/// Periods that a motion is run.
+pub(super) const PERIODS: u32 = 3;
+/// Period of the designed motions, s, and factors on it.
+const PERIOD: f64 = 8.0;
+const SLOWER: [f64; 3] = [1.0, 2.5, 6.0];
+/// Harmonics of the designed motions, of joints and of a platform.
+const HARMONICS: [usize; 2] = [5, 3];
+/// Periods of the random motions, s, how many of each, and their harmonics.
+const RANDOM: [f64; 3] = [4.0, 10.0, 24.0];
+const DRAWS: usize = 2;
+const LINES: [u32; 4] = [1, 3, 5, 7];
+/// Factor by which a motion shrinks about its middle while it breaks a limit, and how often: a random
+/// one, and one that was inside before it was changed.
+const SHRINK: f64 = 0.8;
+const OFTEN: [usize; 2] = [16, 4];
+
+/// Motions of one robot.
+pub(super) struct Motions<'a> {
+    plant: &'a Plant,
+    /// the coordinates with their limits
+    moved: Robot,
+    limits: Checker<'a>,
+    /// lowest and highest value of each coordinate in the fitted records
+    range: Vec<[f64; 2]>,
+}
+
+impl<'a> Motions<'a> {
+    pub fn new(data: &Data<'a>) -> Self {
+        let plant = data.plant;
+        let moved = match plant {
+            Plant::Serial(robot) => with_assumed_limits(robot),
+            Plant::Parallel(mechanism) => mechanism.task_robot(),
+        };
+        let fitted = || data.records.iter().filter(|r| r.fit);
+        let range = (0..plant.coordinates())
+            .map(|k| {
+                let all = fitted().flat_map(|r| &r.x.q[k * r.count..(k + 1) * r.count]);
+                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
+                    [a.min(*v), b.max(*v)]
+                })
+            })
+            .collect();
+        Motions {
+            limits: Checker::new(plant, &moved, 1.0),
+            plant,
+            moved,
+            range,
+        }
+    }
+
+    /// Designed and random motions, each inside all limits.
+    pub fn first(&self, seed: u64, rng: &mut ChaCha8Rng) -> Vec<Trajectory> {
+        let mut all = self.designed(seed);
+        all.extend(self.random(rng));
+        let inside = all
+            .into_par_iter()
+            .with_max_len(1)
+            .filter_map(|(motion, often)| self.inside(motion, often));
+        inside.map(|f| self.trajectory(f)).collect()
+    }
+
+    /// The program's own designs on two grids, each also slower.
+    fn designed(&self, seed: u64) -> Vec<(Fourier, usize)> {
+        let parallel = self.plant.mechanism();
+        // following loops in every step of the optimiser takes minutes
+        if parallel.is_some_and(|m| m.kind == "loops") {
+            return Vec::new();
+        }
+        let mut all = Vec::new();
+        for (k, grid) in [Grid::Odd, Grid::Full].into_iter().enumerate() {
+            let wanted = Design {
+                harmonics: HARMONICS[usize::from(parallel.is_some())],
+                period: PERIOD,
+                grid,
+                seed: seed + k as u64,
+                starts: Some(1),
+                ends: Ends::Free,
+                ..Design::default()
+            };
+            // a robot that no motion of this period suits may have others
+            let Ok(found) = design_plant(self.plant, &wanted, &AtomicBool::new(false), &|_| {})
+            else {
+                continue;
+            };
+            for factor in SLOWER {
+                let mut motion = found.trajectory.fourier.clone();
+                motion.period *= factor;
+                all.push((motion, OFTEN[1]));
+            }
+        }
+        all
+    }
+
+    /// Random motions about the middle of the records.
+    fn random(&self, rng: &mut ChaCha8Rng) -> Vec<(Fourier, usize)> {
+        let periods = RANDOM.iter().flat_map(|p| [*p; DRAWS]);
+        periods
+            .filter_map(|period| {
+                let joints = self.range.iter().map(|[a, b]| {
+                    let mut draw =
+                        |h: u32| (b - a) / 3.0 / f64::from(h) * rng.random_range(-1.0..1.0);
+                    Series {
+                        constant: 0.5 * (a + b),
+                        sin: LINES.map(&mut draw).to_vec(),
+                        cos: LINES.map(&mut draw).to_vec(),
+                    }
+                });
+                let motion = Fourier::new(period, LINES.to_vec(), joints.collect()).ok()?;
+                Some((motion, OFTEN[0]))
+            })
+            .collect()
+    }
+
+    /// A random step from a motion: every coefficient by up to `step` of the largest of its
+    /// coordinate, the middle by half of that, the period by a factor of `exp(± step)`.
+    pub fn changed(&self, from: &Trajectory, step: f64, rng: &mut ChaCha8Rng) -> Fourier {
+        let mut motion = from.fourier.clone();
+        let mut draw = |size: f64| size * step * rng.random_range(-1.0..1.0);
+        motion.period *= draw(1.0).exp();
+        for s in &mut motion.joints {
+            let all = s.sin.iter().chain(&s.cos);
+            let size = all.fold(0.0f64, |m, v| m.max(v.abs()));
+            let each = s.sin.iter_mut().chain(&mut s.cos);
+            each.for_each(|v| *v += draw(size));
+            s.constant += draw(0.5 * size);
+        }
+        motion
+    }
+
+    /// A changed motion shrunk about its middle until all limits hold; `None` where that fails.
+    pub fn kept(&self, motion: Fourier) -> Option<Trajectory> {
+        Some(self.trajectory(self.inside(motion, OFTEN[1])?))
+    }
+
+    fn inside(&self, mut motion: Fourier, often: usize) -> Option<Fourier> {
+        for _ in 0..often {
+            if self.limits.holds(&motion).unwrap_or(false) {
+                return Some(motion);
+            }
+            for s in &mut motion.joints {
+                let each = s.sin.iter_mut().chain(&mut s.cos);
+                each.for_each(|v| *v *= SHRINK);
+            }
+        }
+        None
+    }
+
+    fn trajectory(&self, fourier: Fourier) -> Trajectory {
+        let odd = fourier.harmonics.iter().all(|h| h % 2 == 1);
+        Trajectory {
+            periods: PERIODS,
+            ends: Ends::Free,
+            grid: if odd { Grid::Odd } else { Grid::Full },
+            ..Trajectory::new(&self.moved, fourier)
+        }
+    }
+
+    /// Units of the coordinates.
+    pub fn units(&self) -> Vec<&'static str> {
+        use crate::robot::Motion;
+        let unit = |motion: Motion| match motion {
+            Motion::Revolute => "rad",
+            Motion::Prismatic => "m",
+        };
+        self.moved.joints.iter().map(|j| unit(j.motion)).collect()
+    }
+}

@@ -1,0 +1,185 @@
+//! A motion judged before it is run: how far it tells effects apart.
+
+use super::motions::PERIODS;
+use crate::diagnose::catalogue::{Context, Effect};
+use crate::diagnose::data::Data;
+use crate::diagnose::evidence::{Evidence, Projected};
+use crate::diagnose::record::Record;
+use crate::diagnose::{Finding, search};
+use crate::trajectory::Fourier;
+
+/// How closely a motion is looked at: most samples of a period, and shapes of an effect.
+#[derive(Clone, Copy)]
+pub(super) struct Detail {
+    pub samples: usize,
+    pub shapes: usize,
+}
+
+/// While motions are compared, and in the last prediction.
+pub(super) const COARSE: Detail = Detail {
+    samples: 1500,
+    shapes: 5,
+};
+pub(super) const FINE: Detail = Detail {
+    samples: 12_000,
+    shapes: 24,
+};
+/// Energy that the believed effect must have in a motion, per row, in noise variances.
+const SEEN: f64 = 0.05;
+
+/// An effect at a place, with its shape and, where they are known, its coefficients.
+pub(super) struct Placed<'a> {
+    pub effect: &'a dyn Effect,
+    place: &'a [usize],
+    shape: &'a [f64],
+    eta: Option<&'a [f64]>,
+}
+
+impl<'a> Placed<'a> {
+    pub fn of_finding(effects: &'a [Box<dyn Effect>], f: &'a Finding) -> Option<Self> {
+        let effect = effects.iter().find(|e| e.card().name == f.effect)?;
+        Some(Placed {
+            effect: effect.as_ref(),
+            place: &f.place,
+            shape: &f.shape,
+            eta: Some(&f.eta),
+        })
+    }
+
+    pub fn of_candidate(effects: &'a [Box<dyn Effect>], c: &'a search::Candidate) -> Self {
+        Placed {
+            effect: effects[c.effect].as_ref(),
+            place: &c.place,
+            shape: &c.shape,
+            eta: None,
+        }
+    }
+
+    /// Title and place, for sentences.
+    pub fn words(&self, joints: &[String]) -> String {
+        let title = self.effect.card().title;
+        match self.place.is_empty() {
+            true => title.to_string(),
+            false => {
+                let names: Vec<&str> = self.place.iter().map(|j| joints[*j].as_str()).collect();
+                format!("{title} on {}", names.join(" and "))
+            }
+        }
+    }
+
+    fn projected(&self, evidence: &Evidence, cx: &Context) -> Option<Projected> {
+        let columns = self.effect.columns(cx, self.place, self.shape, false);
+        (!columns.is_empty()).then(|| evidence.project(&columns))
+    }
+
+    /// With the fitted shape and others of its grid, in all no more than `most`.
+    fn shapes(&self, evidence: &Evidence, cx: &Context, most: usize) -> Vec<Projected> {
+        let grid = self.effect.shapes(cx, self.place);
+        let stride = grid.len().div_ceil(most.max(2) - 1).max(1);
+        let others = grid.into_iter().step_by(stride).filter(|s| s != self.shape);
+        let all = std::iter::once(self.shape.to_vec()).chain(others);
+        let sets: Vec<_> = all
+            .enumerate()
+            .map(|(i, s)| self.effect.columns(cx, self.place, &s, i > 0))
+            .filter(|c| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()))
+            .collect();
+        evidence.project_all(&sets)
+    }
+}
+
+/// What a motion is to tell apart.
+pub(super) enum Target<'a> {
+    /// an effect and its rival
+    Pair(Placed<'a>, Placed<'a>),
+    /// an effect and the nominal model
+    Hidden(Placed<'a>),
+}
+
+impl Target<'_> {
+    /// Share of the effect that its rival, or the nominal model, can imitate. A rival has whichever of
+    /// `shapes` shapes imitates most; an effect of unknown size the one that shows best. `None` where the
+    /// effect is not there, or is lost in the noise.
+    pub fn overlap(&self, evidence: &Evidence, cx: &Context, shapes: usize) -> Option<f64> {
+        match self {
+            Target::Pair(a, b) => {
+                let eta = a.eta?;
+                let a = a.projected(evidence, cx)?;
+                let enough = SEEN * evidence.data.fitted as f64;
+                if a.z.len() != eta.len() || a.energy(eta).0 <= enough {
+                    return None;
+                }
+                let rivals = b.shapes(evidence, cx, shapes);
+                let each = rivals.iter().map(|b| evidence.overlap(&a, eta, b));
+                each.reduce(f64::max)
+            }
+            Target::Hidden(a) => {
+                let seen = match a.eta {
+                    Some(eta) => Some(a.projected(evidence, cx)?.visibility(Some(eta))),
+                    None => {
+                        let all = a.shapes(evidence, cx, shapes);
+                        all.iter().map(|z| z.visibility(None)).reduce(f64::max)
+                    }
+                };
+                seen.map(|v| 1.0 - v)
+            }
+        }
+    }
+}
+
+/// The state of the diagnosis that motions are judged in.
+pub(super) struct Trial<'a> {
+    pub data: &'a Data<'a>,
+    pub phi: &'a [f64],
+}
+
+impl Trial<'_> {
+    /// Overlaps of targets in a motion that is run [`PERIODS`] times, Noise, window, prior and ordinary imperfections are those of the records.
+    pub fn overlaps(&self, motion: &Fourier, detail: Detail, of: &[&Target]) -> Vec<Option<f64>> {
+        self.try_overlaps(motion, detail, of)
+            .unwrap_or_else(|| vec![None; of.len()])
+    }
+
+    fn try_overlaps(
+        &self,
+        motion: &Fourier,
+        detail: Detail,
+        of: &[&Target],
+    ) -> Option<Vec<Option<f64>>> {
+        let plant = self.data.plant;
+        let sampled = self.data.records.first()?.dt;
+        let wanted = (motion.period / sampled).round() as usize;
+        let count = wanted.clamp(64, detail.samples);
+        let x = motion.motion(count);
+        let n = self.data.joints();
+        let record = Record {
+            name: "next".into(),
+            fit: true,
+            dt: motion.period / count as f64,
+            count,
+            cycle: Some(count),
+            actuators: plant.actuator_motion(&x).ok()?,
+            x,
+            tau: vec![0.0; n * count],
+            position_noise: vec![0.0; n],
+            band: 20.0,
+            order: 0,
+            remarks: Vec::new(),
+        };
+        let noise = Some(self.data.noise.clone());
+        let mut data = Data::with_noise(plant, vec![record], noise).ok()?;
+        data.ordinary();
+        data.window = self.data.window;
+        if data.parameters.len() != self.phi.len() {
+            return None;
+        }
+        // k times as many rows weigh the prior as k times its variance would
+        let rows = f64::from(PERIODS) * wanted as f64 / count as f64;
+        let evidence = Evidence::new(&data, rows.max(1.0).sqrt());
+        let cx = Context::new(&data, self.phi.to_vec()).ok()?;
+        Some(
+            of.iter()
+                .map(|t| t.overlap(&evidence, &cx, detail.shapes))
+                .collect(),
+        )
+    }
+}

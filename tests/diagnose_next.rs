@@ -1,0 +1,239 @@
+//! The next motion: what two effects, or an effect and the nominal model, have in common in the records
+//! at hand, in the proposed motion as predicted, and once that motion is rehearsed.
+//!
+//! `cargo test --release --test diagnose_next -- --nocapture` prints the table of `docs/diagnosis.md`.
+
+use excite::design::{Condition, Settings as Design, design_plant};
+use excite::diagnose::next::{NOMINAL, Proposal};
+use excite::diagnose::record::Raw;
+use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
+use excite::identifiability::Assessment;
+use excite::mechanism::closed_certificate;
+use excite::plant::Plant;
+use excite::simulate::record::{Sensors, measure};
+use excite::simulate::{Effects, Field, Settings as Simulation, simulate};
+use excite::trajectory::{Ends, Fourier, Grid, Trajectory};
+use std::sync::atomic::AtomicBool;
+
+/// A robot, what it has that its model lacks, and the records of a designed motion.
+struct Case {
+    plant: Plant,
+    effects: Effects,
+    noise: f64,
+    runs: Vec<(Fourier, bool)>,
+}
+
+impl Case {
+    /// `slower`: factor on the period; `only`: the one coordinate that moves.
+    fn new(
+        robot: &str,
+        effect: Option<(Field, &str)>,
+        noise: f64,
+        slower: f64,
+        only: Option<usize>,
+    ) -> Self {
+        let plant = Plant::load(robot).unwrap();
+        let settings = Design {
+            harmonics: 3,
+            period: 5.0,
+            grid: Grid::Odd,
+            ends: Ends::Free,
+            condition: Condition::Normalised,
+            starts: Some(1),
+            ..Design::default()
+        };
+        let found = design_plant(&plant, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
+        let mut motion = found.trajectory.fourier;
+        for (k, s) in motion.joints.iter_mut().enumerate() {
+            if only.is_some_and(|o| o != k) {
+                s.sin.iter_mut().chain(&mut s.cos).for_each(|v| *v = 0.0);
+            }
+        }
+        let at = |factor: f64| Fourier {
+            period: 5.0 * slower * factor,
+            ..motion.clone()
+        };
+        let mut effects = Effects {
+            perturb: 0.03,
+            ..Effects::default()
+        };
+        if let Some((field, text)) = effect {
+            effects.set(&plant, field, text).unwrap();
+        }
+        Case {
+            runs: vec![(at(1.0), true), (at(1.3), false)],
+            plant,
+            effects,
+            noise,
+        }
+    }
+
+    fn logs(&self) -> Vec<Raw> {
+        let one = |(motion, fit): &(Fourier, bool)| {
+            let settings = Simulation {
+                rate: 200.0,
+                step: 5e-4,
+                bandwidth: 30.0,
+                seed: 1,
+                effects: self.effects.clone(),
+                ..Simulation::default()
+            };
+            let run = simulate(&self.plant, motion, 3, &settings, &|_| {}).unwrap();
+            let sensors = Sensors::new(&self.plant, self.noise).0;
+            let seed = (10.0 * motion.period) as u64;
+            let seen = measure(&run, &sensors, &settings.effects, seed);
+            let columns = |x: &[f64]| x.chunks(run.t.len()).map(<[f64]>::to_vec).collect();
+            Raw {
+                name: format!("{:.2} s", motion.period),
+                fit: *fit,
+                period: Some(motion.period),
+                q: columns(&seen.q),
+                tau: columns(&seen.tau),
+                t: run.t,
+            }
+        };
+        self.runs.iter().map(one).collect()
+    }
+
+    fn diagnose(&self, next: bool, tries: usize) -> Diagnosis {
+        let settings = Settings {
+            next,
+            next_tries: tries,
+            ..Settings::default()
+        };
+        of_logs(&self.plant, &self.logs(), &settings, &|_| {}).unwrap()
+    }
+
+    /// The proposal, checked: inside all limits, read back, and in file and report.
+    fn propose(&self) -> (Diagnosis, Proposal) {
+        let begin = std::time::Instant::now();
+        let d = self.diagnose(true, Settings::default().next_tries);
+        let name = self.plant.name();
+        let Some(n) = d.next.clone() else {
+            panic!("{name}: no proposal");
+        };
+        println!(
+            "{name:8} {} against {}: overlap {:.3} now, {:.3} predicted, period {:.1} s ({:.0} s)",
+            n.separates[0],
+            n.separates[1],
+            n.overlap[0],
+            n.overlap[1],
+            n.trajectory.fourier.period,
+            begin.elapsed().as_secs_f64()
+        );
+        assert!(n.overlap[1] < 0.95 * n.overlap[0], "{:?}", n.overlap);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("next.json");
+        n.trajectory.write(&path, false).unwrap();
+        let back = Trajectory::read(&path).unwrap();
+        assert_eq!(back, n.trajectory);
+        let seen = Assessment::with_plant(&self.plant, &back).unwrap();
+        let excitation = seen.excitation.unwrap();
+        assert!(excitation.certificate.satisfied);
+        if let Some(m) = self.plant.mechanism() {
+            assert!(closed_certificate(m, &back.fourier, 1.0).unwrap().satisfied);
+        }
+        let file = json::json(&d, 1.0);
+        assert_eq!(file["next_experiment"]["trajectory"], "next.json");
+        assert!(page::html(&d).contains("next.json"));
+        (d, n)
+    }
+
+    /// Diagnosis with the proposed motion rehearsed and added to the records.
+    fn rehearsed(&mut self, next: &Proposal) -> Diagnosis {
+        self.runs.push((next.trajectory.fourier.clone(), true));
+        self.diagnose(false, 0)
+    }
+}
+
+/// Confidence of an effect.
+fn confidence(d: &Diagnosis, effect: &str) -> f64 {
+    let of = d.findings.iter().filter(|f| f.effect == effect);
+    of.map(|f| f.confidence).fold(0.0, f64::max)
+}
+
+/// How sure the first effect of a proposal is, and the second, before and after.
+fn told(before: &Diagnosis, after: &Diagnosis, n: &Proposal) -> [[f64; 2]; 2] {
+    let each = |d: &Diagnosis| [0, 1].map(|i| confidence(d, n.separates[i]));
+    let all = [each(before), each(after)];
+    println!(
+        "         confidence {:.2?}, rehearsed {:.2?}",
+        all[0], all[1]
+    );
+    all
+}
+
+#[test]
+fn stribeck_and_viscous_friction_of_an_h4_are_told_apart() {
+    let effect = Some((Field::Stribeck, "motor1=0.3,0.6"));
+    let mut case = Case::new("h4", effect, 0.5, 0.4, None);
+    let (before, n) = case.propose();
+    assert_eq!(
+        n.separates,
+        ["stribeck_friction", "nonlinear_viscous_friction"]
+    );
+    assert!(n.overlap[1] < 0.6 * n.overlap[0], "{:?}", n.overlap);
+    let after = case.rehearsed(&n);
+    let [[a, b], [later, rival]] = told(&before, &after, &n);
+    assert!(later > a && rival < 0.5 * b, "{a} {b} {later} {rival}");
+}
+
+#[test]
+fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
+    let effect = Some((Field::Stribeck, "leg2=60,0.15"));
+    let mut case = Case::new("hexapod", effect, 1.0, 0.4, None);
+    let (before, n) = case.propose();
+    assert_eq!(
+        n.separates,
+        ["stribeck_friction", "nonlinear_viscous_friction"]
+    );
+    assert!(n.overlap[1] < 0.3 * n.overlap[0], "{:?}", n.overlap);
+    let after = case.rehearsed(&n);
+    let [[a, b], [later, rival]] = told(&before, &after, &n);
+    assert!(later > a && rival < 0.5 * b, "{a} {b} {later} {rival}");
+}
+
+#[test]
+fn what_the_records_of_an_h4_cannot_show_is_shown() {
+    let effect = Some((Field::LoadFriction, "motor1=0.1"));
+    let mut case = Case::new("h4", effect, 1.0, 0.2, None);
+    let (before, n) = case.propose();
+    assert_eq!(n.separates, ["payload", NOMINAL]);
+    let hidden = |d: &Diagnosis| d.untestable.iter().any(|u| u.0 == "payload");
+    assert!(hidden(&before));
+    assert!(!hidden(&case.rehearsed(&n)));
+}
+
+#[test]
+fn what_the_records_of_an_arm_cannot_show_is_shown() {
+    let mut case = Case::new("ur5e", None, 1.0, 1.0, Some(1));
+    let (before, n) = case.propose();
+    assert_eq!(n.separates[1], NOMINAL);
+    let hidden = |d: &Diagnosis| {
+        d.untestable
+            .iter()
+            .filter(|u| u.0 == n.separates[0])
+            .count()
+    };
+    let after = case.rehearsed(&n);
+    println!(
+        "         untestable at {} places, then {}",
+        hidden(&before),
+        hidden(&after)
+    );
+    assert!(hidden(&after) < hidden(&before));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_motion_on_any_number_of_threads() {
+    let effect = Some((Field::Stribeck, "motor1=0.3,0.6"));
+    let case = Case::new("h4", effect, 0.5, 0.4, None);
+    let motion = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        let d = pool.install(|| case.diagnose(true, 8));
+        d.next.map(|n| n.trajectory)
+    };
+    assert!(motion(1).is_some());
+    assert_eq!(motion(1), motion(3));
+}
