@@ -1,12 +1,12 @@
 //! `excite diagnose EXPERIMENT`.
 
 use super::{pretty, print, warn, write};
-use excite::Result;
 use excite::diagnose::{Settings, diagnose, improve, json, page};
 use excite::estimate::robot::urdf;
 use excite::log::Experiment;
 use excite::output::prepare_dir;
 use excite::report::format::{percent, significant};
+use excite::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -85,8 +85,13 @@ pub fn run(args: Args) -> Result<()> {
         )?;
         write(&paths[5], args.force, &improve::mujoco(&robot, &d))?;
     }
-    if let Some(n) = &d.next {
-        n.trajectory.write(&paths[3], args.force)?;
+    match &d.next {
+        Some(n) => n.trajectory.write(&paths[3], args.force)?,
+        // that of an earlier diagnosis, which --force replaces
+        None if args.force && paths[3].is_file() => {
+            std::fs::remove_file(&paths[3]).map_err(|e| Error::io(&paths[3], e))?;
+        }
+        None => {}
     }
     if args.json {
         return print(&pretty(&report));

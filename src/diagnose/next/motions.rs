@@ -5,7 +5,9 @@ use crate::design::diagnostic::Checker;
 use crate::design::{Settings as Design, design_plant, with_assumed_limits};
 use crate::diagnose::data::Data;
 use crate::plant::Plant;
+use crate::report::format::unit_of;
 use crate::robot::Robot;
+use crate::trajectory::certificate::Kind;
 use crate::trajectory::{Ends, Fourier, Grid, Series, Trajectory};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -171,11 +173,7 @@ impl<'a> Motions<'a> {
 
     /// Units of the coordinates.
     pub fn units(&self) -> Vec<&'static str> {
-        use crate::robot::Motion;
-        let unit = |motion: Motion| match motion {
-            Motion::Revolute => "rad",
-            Motion::Prismatic => "m",
-        };
+        let unit = |motion| unit_of(Kind::Position, motion);
         self.moved.joints.iter().map(|j| unit(j.motion)).collect()
     }
 }

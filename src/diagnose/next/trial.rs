@@ -133,7 +133,8 @@ pub(super) struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Overlaps of targets in a motion that is run [`PERIODS`] times, Noise, window, prior and ordinary imperfections are those of the records.
+    /// Overlaps of targets in a motion that is run [`PERIODS`] times. Noise, window, prior and ordinary
+    /// imperfections are those of the records.
     pub fn overlaps(&self, motion: &Fourier, detail: Detail, of: &[&Target]) -> Vec<Option<f64>> {
         self.try_overlaps(motion, detail, of)
             .unwrap_or_else(|| vec![None; of.len()])
