@@ -213,6 +213,7 @@ fn trajectory(e: &Excitation) -> Value {
     json!({
         "period": number(t.fourier.period),
         "periods": t.periods,
+        "coordinates": t.space,
         "harmonics": t.fourier.harmonics,
         "grid": t.grid.name(),
         "ends": t.ends.name(),
