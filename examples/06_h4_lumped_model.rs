@@ -56,6 +56,9 @@ fn main() -> Result<()> {
             100.0 * relative(&mechanism.torque(&fit, &phi)?, &tau_fit),
             100.0 * relative(&mechanism.torque(&other, &phi)?, &tau_other),
         );
+        if model == "lumped-gravity" {
+            println!("    nominal values with the weight of the arms: the figure quoted as 6 %");
+        }
         if model == "lumped" {
             for (p, value) in mechanism.parameters.list.iter().zip(&phi) {
                 println!(

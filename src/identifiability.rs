@@ -22,7 +22,7 @@ use crate::regressor::{Regressor, nominal_torque};
 use crate::robot::Robot;
 use crate::trajectory::certificate::{Certificate, certify};
 use crate::trajectory::torque::torque_certificate;
-use crate::trajectory::{Fourier, Trajectory};
+use crate::trajectory::{Fourier, Space, Trajectory};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
 
@@ -92,10 +92,12 @@ pub struct Excitation {
 /// What the platform of a parallel robot does.
 #[derive(Debug, Clone)]
 pub struct Platform {
-    /// what the task coordinates are
+    /// what its coordinates are
     pub task: Task,
     /// their names
     pub names: Vec<String>,
+    /// what the series of the trajectory move
+    pub space: Space,
     /// one period at [`RATE`], the end point left out
     pub motion: Samples,
     /// workspace box, actuators, passive joints, singularities and distances
@@ -198,11 +200,13 @@ impl Assessment {
     /// What a robot of either kind will tell on this trajectory.
     ///
     /// # Errors
-    /// As [`Assessment::new`]; for a parallel robot also when the motion leaves its reach.
+    /// As [`Assessment::new`]; for a parallel robot also when the motion leaves its reach, or its
+    /// coordinates are none of the robot's.
     pub fn with_plant(plant: &Plant, trajectory: &Trajectory) -> Result<Self> {
-        match plant {
+        let plant = plant.clone().in_space(trajectory.space)?;
+        match &plant {
             Plant::Serial(robot) => Self::new(robot, trajectory),
-            Plant::Parallel(mechanism) => closed::assess(plant, mechanism, trajectory),
+            Plant::Parallel(mechanism) => closed::assess(&plant, mechanism, trajectory),
         }
     }
 

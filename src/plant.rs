@@ -11,10 +11,11 @@
 
 use crate::base::{self, BaseParameters};
 use crate::dynamics::{Samples, Tree};
-use crate::error::{Result, Warning};
+use crate::error::{Error, Result, Warning};
 use crate::mechanism::{Mechanism, RawColumn};
 use crate::regressor::{Regressor, nominal_torque, term_factor};
 use crate::robot::{Column, Joint, JointTerm, Prior, Robot};
+use crate::trajectory::Space;
 use faer::Mat;
 
 /// What a parameter of a [`Plant`] is.
@@ -51,11 +52,11 @@ pub struct Parameter {
 }
 
 /// A serial (or tree) or a parallel robot.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub enum Plant {
     /// a tree: coordinates are its joints, all of them actuated
     Serial(Robot),
-    /// a closed chain: coordinates are the pose of its platform
+    /// a closed chain: coordinates are the pose of its platform, or its actuators ([`Plant::in_space`])
     Parallel(Box<Mechanism>),
 }
 
@@ -81,6 +82,29 @@ impl Plant {
             Plant::Serial(robot) => Plant::Serial(robot.with_terms(terms)),
             Plant::Parallel(mechanism) => Plant::Parallel(Box::new(mechanism.with_terms(terms))),
         })
+    }
+
+    /// The same robot with these coordinates; with its own where none are named. Those of a serial
+    /// robot, and of a closed chain without a platform, are always its actuators.
+    ///
+    /// # Errors
+    /// A robot without a platform that is asked for one, and as [`Mechanism::in_actuators`].
+    pub fn in_space(self, space: Option<Space>) -> Result<Self> {
+        let mechanism = match (self, space) {
+            (plant, None) => return Ok(plant),
+            (Plant::Serial(robot), Some(Space::Actuators)) => return Ok(Plant::Serial(robot)),
+            (Plant::Parallel(m), Some(Space::Actuators)) => m.in_actuators()?,
+            (Plant::Parallel(m), _) if m.platform().space() == Space::Platform => {
+                m.platform().clone()
+            }
+            (plant, _) => {
+                return Err(Error::Argument(format!(
+                    "{} has no platform: its coordinates are its actuators",
+                    plant.name()
+                )));
+            }
+        };
+        Ok(Plant::Parallel(Box::new(mechanism)))
     }
 
     /// The bodies and joints: of a parallel robot its tree, passive joints included.
@@ -272,18 +296,7 @@ impl Plant {
         let Plant::Parallel(mechanism) = self else {
             return Ok(x.clone());
         };
-        let all = mechanism.motion(x)?.tree;
-        let rows = |a: &[f64]| -> Vec<f64> {
-            let row = |&j: &usize| a[j * x.count..(j + 1) * x.count].to_vec();
-            mechanism.actuated.iter().flat_map(row).collect()
-        };
-        Ok(Samples {
-            dof: mechanism.actuators(),
-            count: x.count,
-            q: rows(&all.q),
-            qd: rows(&all.qd),
-            qdd: rows(&all.qdd),
-        })
+        Ok(mechanism.motion(x)?.tree.rows(&mechanism.actuated))
     }
 
     /// Random states inside the limits (inside the workspace box, of a parallel robot, and away

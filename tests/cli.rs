@@ -447,3 +447,59 @@ fn diagnostic_motions_keep_the_limits_and_wait_for_logs() {
         &["--grid"],
     );
 }
+
+#[test]
+fn series_of_the_actuators_are_designed_judged_and_simulated() {
+    let t = Test::new();
+    let out = t.run(
+        "design delta --coordinates actuators --starts 1 --period 2 --harmonics 3 --rate 100 \
+         --output a",
+    );
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let file = t.json("a/trajectory.json");
+    assert_eq!(file["coordinates"], "actuators");
+    assert_eq!(file["joints"][2], "motor3");
+    let report = t.json("a/report.json");
+    assert_eq!(report["trajectory"]["coordinates"], "actuators");
+    assert_eq!(report["platform"]["coordinates"][0], "x");
+    assert_eq!(report["limits"]["satisfied"], true);
+    let html = std::fs::read_to_string(t.path().join("a/report.html")).unwrap();
+    assert!(html.contains("--coordinates actuators"));
+    assert!(html.contains("follows from the series of the actuators"));
+    let samples = std::fs::read_to_string(t.path().join("a/samples.csv")).unwrap();
+    assert!(samples.starts_with("t,q1,q2,q3,") && samples.contains(",x,y,z,dx,"));
+    // the file says how it is to be read
+    let out = t.run("identifiability delta a/trajectory.json --output b");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert_eq!(
+        t.json("b/report.json")["condition_number"],
+        report["condition_number"]
+    );
+    let out = t.run("torque delta a/samples.csv");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let last = |text: &str| -> f64 { text.trim_end().rsplit(',').next().unwrap().parse().unwrap() };
+    let tau = samples.lines().nth(50).unwrap().split(',').nth(12).unwrap();
+    let again = last(out.stdout.lines().nth(50).unwrap());
+    assert!((tau.parse::<f64>().unwrap() - again).abs() < 1e-9);
+    let out = t.run(
+        "simulate delta a/trajectory.json --periods 3 --rate 200 --pose --output log.csv \
+         --experiment experiment.toml",
+    );
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let log = std::fs::read_to_string(t.path().join("log.csv")).unwrap();
+    assert!(log.lines().next().unwrap().ends_with("x,y,z,qw,qx,qy,qz"));
+    let out = t.run("identify experiment.toml --output c");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+
+    t.fails(
+        "design panda --coordinates platform --output d",
+        2,
+        &["panda", "has no platform"],
+    );
+    t.fails("design delta --coordinates legs", 2, &["legs", "actuators"]);
+    t.fails(
+        "identifiability hexapod a/trajectory.json --output e",
+        1,
+        &["trajectory.json", "motor1", "delta"],
+    );
+}

@@ -2,13 +2,18 @@
 
 mod common;
 
-use common::parallel::{delta, h4, hexapod, reference};
+use common::parallel::{check_at_100_khz, delta, h4, hexapod, reference};
+use excite::Plant;
+use excite::design::{Condition, Settings, design_closed};
 use excite::dynamics::{Isa, Samples};
+use excite::identifiability::Assessment;
 use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
-use excite::mechanism::{ClosedWorkspace, Mechanism, TaskDerivatives};
+use excite::mechanism::{ClosedWorkspace, Mechanism, TaskDerivatives, closed_certificate};
+use excite::trajectory::{Space, Trajectory, certify};
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 fn frame(body: usize, position: Vector3<f64>) -> Frame {
     Frame {
@@ -239,8 +244,11 @@ fn derivatives(m: &Mechanism, seed: u64) {
 
 #[test]
 fn derivatives_are_those_of_differences() {
-    for (_, loops) in pairs() {
+    for (closed, loops) in pairs() {
         derivatives(&loops, 11);
+        let own = closed.in_actuators().unwrap();
+        let half = vec![0.1; own.freedoms()];
+        derivatives(&own.with_workspace(&half), 13);
     }
     for top in [POINT, POSE] {
         derivatives(&five_bar(top).unwrap(), 12);
@@ -383,6 +391,42 @@ fn a_five_bar_is_the_textbook_one() {
             "{two} {three}"
         );
     }
+}
+
+#[test]
+fn a_five_bar_is_designed_in_its_actuators() {
+    let limits = "[actuator]\nacceleration = 60.0\njerk = 2000.0\n";
+    let m = five_bar(&POINT.replace("[[loop]]", &format!("{limits}[[loop]]"))).unwrap();
+    assert_eq!(m.space(), Space::Actuators);
+    assert_eq!(m.in_actuators().unwrap().task_names, m.task_names);
+    let settings = Settings {
+        starts: Some(2),
+        harmonics: 4,
+        period: 3.0,
+        condition: Condition::Normalised,
+        ..Settings::default()
+    };
+    let design = design_closed(&m, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
+    let t = &design.trajectory;
+    assert_eq!(t.space, Some(Space::Actuators));
+    // as for a serial robot: exact, forces excepted
+    let c = closed_certificate(&m, &t.fourier, 1.0).unwrap();
+    assert!(c.satisfied && c.proven);
+    let exact = certify(&m.actuator_robot(), &t.fourier).unwrap();
+    for (a, b) in c.actuators.joints.iter().zip(&exact.joints) {
+        assert_eq!((a.velocity, a.jerk), (b.velocity, b.jerk));
+    }
+    check_at_100_khz(&m, &t.fourier);
+    let text = t.to_json().unwrap();
+    assert!(text.contains("\"coordinates\": \"actuators\""));
+    let plant = Plant::Parallel(Box::new(m));
+    let read = Trajectory::parse(&text, "t.json").unwrap();
+    let a = Assessment::with_plant(&plant, &read).unwrap();
+    let condition = a.excitation.unwrap().condition.normalised;
+    println!("five-bar: condition number {condition:.1}");
+    assert!(condition < 100.0, "{condition}");
+    let e = plant.in_space(Some(Space::Platform)).unwrap_err();
+    assert!(e.to_string().contains("has no platform"), "{e}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::parallel;
+use common::parallel::{self, check_at_100_khz};
 use excite::Plant;
 use excite::design::criterion::{Condition, Criterion, Objective};
 use excite::design::information::{Evaluation, Information};
@@ -11,7 +11,7 @@ use excite::dynamics::Samples;
 use excite::identifiability::Assessment;
 use excite::mechanism::{Mechanism, closed_certificate};
 use excite::robot::{JointTerm, Limits};
-use excite::trajectory::{Basis, Ends, Fourier, Trajectory};
+use excite::trajectory::{Basis, Ends, Fourier, Space, Trajectory, certify};
 use rand::Rng;
 use std::sync::atomic::AtomicBool;
 
@@ -61,6 +61,7 @@ fn gradients_are_the_differences_of_the_criterion() {
     for (mechanism, condition) in [
         (hexapod(), Condition::Normalised),
         (hexapod(), Condition::Weighted),
+        (hexapod().in_actuators().unwrap(), Condition::Normalised),
     ] {
         let base = mechanism.base().unwrap();
         let basis = Basis::new(&[1, 2, 3], Ends::Rest, 6, None).unwrap();
@@ -75,7 +76,7 @@ fn gradients_are_the_differences_of_the_criterion() {
             let mut c = vec![0.0; 2 * h + 1];
             c[0] = mechanism.home[k];
             let mut own = basis.parameters(k, &c).as_slice().to_vec();
-            let scale = if k < 3 { 0.03 } else { 0.08 };
+            let scale = if mechanism.is_angle(k) { 0.08 } else { 0.03 };
             for (i, v) in own.iter_mut().enumerate() {
                 if i > 0 || m == 1 {
                     *v += scale * r.random_range(-1.0..1.0);
@@ -108,111 +109,6 @@ fn gradients_are_the_differences_of_the_criterion() {
                 gradient[k]
             );
         }
-    }
-}
-
-/// The motion at uniform instants, in pieces.
-fn pieces(fourier: &Fourier, count: usize, mut see: impl FnMut(usize, &Samples)) {
-    let dof = fourier.dof();
-    for from in (0..count).step_by(1000) {
-        let n = 1000.min(count - from);
-        let mut s = Samples::zeros(dof, n);
-        let (mut q, mut qd, mut qdd) = (vec![0.0; dof], vec![0.0; dof], vec![0.0; dof]);
-        for i in 0..n {
-            let t = (from + i) as f64 * fourier.period / count as f64;
-            fourier.evaluate(t, [&mut q[..], &mut qd, &mut qdd]);
-            for k in 0..dof {
-                s.q[k * n + i] = q[k];
-                s.qd[k * n + i] = qd[k];
-                s.qdd[k * n + i] = qdd[k];
-            }
-        }
-        see(from, &s);
-    }
-}
-
-/// Nothing exceeds its bound at 100 kHz, and the bounds are close.
-fn check_at_100_khz(mechanism: &Mechanism, fourier: &Fourier) {
-    let c = closed_certificate(mechanism, fourier, 1.0).unwrap();
-    assert!(c.proven);
-    let count = (fourier.period * 1e5) as usize;
-    let na = mechanism.actuators();
-    let mut most = vec![[0.0f64; 4]; na];
-    let mut range = vec![[f64::INFINITY, f64::NEG_INFINITY]; na];
-    let mut last: Option<Vec<f64>> = None;
-    let pairs = mechanism.pairs();
-    let mut worst = vec![f64::NEG_INFINITY; c.pose.len()];
-    pieces(fourier, count, |_, s| {
-        let motion = mechanism.motion(s).unwrap().tree;
-        let tau = mechanism.nominal_torque(s).unwrap();
-        let n = s.count;
-        for (a, &j) in mechanism.actuated.iter().enumerate() {
-            for i in 0..n {
-                let q = motion.q[j * n + i];
-                range[a] = [range[a][0].min(q), range[a][1].max(q)];
-                let m = &mut most[a];
-                m[0] = m[0].max(motion.qd[j * n + i].abs());
-                m[1] = m[1].max(motion.qdd[j * n + i].abs());
-                let before = match (i, &last) {
-                    (0, Some(last)) => last[a],
-                    (0, None) => motion.qdd[j * n],
-                    _ => motion.qdd[j * n + i - 1],
-                };
-                m[2] = m[2].max((motion.qdd[j * n + i] - before).abs() * 1e5);
-                m[3] = m[3].max(tau[a * n + i].abs());
-            }
-        }
-        last = Some(
-            mechanism
-                .actuated
-                .iter()
-                .map(|&j| motion.qdd[j * n + n - 1])
-                .collect(),
-        );
-        // poses at 10 kHz are slow enough to look at
-        for i in (0..n).step_by(10) {
-            let x: Vec<f64> = (0..s.dof).map(|k| s.q[k * n + i]).collect();
-            for (w, u) in worst.iter_mut().zip(mechanism.pose_uses(&x, &pairs)) {
-                *w = w.max(u.used());
-            }
-        }
-    });
-    for (a, joint) in c.actuators.joints.iter().enumerate() {
-        let p = &joint.position;
-        assert!(range[a][0] >= p.bounds[0] && range[a][1] <= p.bounds[1]);
-        let width = p.bounds[1] - p.bounds[0];
-        assert!(
-            width < 1.02 * (range[a][1] - range[a][0]) + 1e-6,
-            "{}",
-            joint.joint
-        );
-        for (k, peak) in [&joint.velocity, &joint.acceleration, &joint.jerk]
-            .into_iter()
-            .enumerate()
-        {
-            let rounding = if k == 2 { 1e-6 } else { 0.0 };
-            assert!(
-                most[a][k] <= peak.bound * (1.0 + rounding) + rounding,
-                "{} order {}: {} beyond {}",
-                joint.joint,
-                k + 1,
-                most[a][k],
-                peak.bound
-            );
-        }
-        let force = joint.torque.as_ref().unwrap();
-        assert!(
-            most[a][3] <= force.bound() * (1.0 + 1e-9),
-            "{}",
-            joint.joint
-        );
-    }
-    for (p, worst) in c.pose.iter().zip(worst) {
-        let bound = match p.kind {
-            excite::mechanism::PoseKind::PassiveJoint => p.bound / p.limit,
-            _ => p.limit / p.bound,
-        };
-        assert!(worst <= bound * (1.0 + 1e-9), "{}: {worst} {bound}", p.name);
     }
 }
 
@@ -259,6 +155,97 @@ fn bundled_parallel_robots_are_designed_inside_their_limits() {
         read.fourier.evaluate(0.0, [&mut q[..], &mut qd, &mut qdd]);
         assert!(qd.iter().chain(&qdd).all(|v| v.abs() < 1e-12));
     }
+}
+
+/// Largest deviation of velocities and accelerations from differences of the positions.
+fn differences(fourier: &Fourier, motion: impl Fn(&Samples) -> Samples) -> [f64; 2] {
+    let h = 1e-4;
+    let mut off = [0.0f64; 2];
+    for i in 0..20 {
+        let t = fourier.period * (0.03 + 0.047 * f64::from(i));
+        let state = |t: f64| {
+            let mut s = Samples::zeros(fourier.dof(), 1);
+            fourier.evaluate(t, [&mut s.q[..], &mut s.qd, &mut s.qdd]);
+            motion(&s)
+        };
+        let near = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| state(t + k * h));
+        for k in 0..near[2].dof {
+            let slope = |of: fn(&Samples) -> &[f64]| {
+                let [a, b, _, c, d] = near.each_ref().map(|s| of(s)[k]);
+                (8.0 * (c - b) - (d - a)) / (12.0 * h)
+            };
+            off[0] = off[0].max((slope(|s| &s.q) - near[2].qd[k]).abs());
+            off[1] = off[1].max((slope(|s| &s.qd) - near[2].qdd[k]).abs());
+        }
+    }
+    off
+}
+
+#[test]
+fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
+    for (name, most) in [("delta", 40.0), ("h4", 40.0), ("hexapod", 150.0)] {
+        let plant = bundled(name);
+        let own = mechanism(&plant).in_actuators().unwrap();
+        let settings = Settings {
+            period: 4.0,
+            harmonics: 4,
+            ..quick(2)
+        };
+        let design = run(&own, &settings);
+        let t = &design.trajectory;
+        assert_eq!(t.space, Some(Space::Actuators));
+        assert_eq!(t.joints, own.actuator_names());
+        let c = closed_certificate(&own, &t.fourier, 1.0).unwrap();
+        assert!(c.satisfied && c.proven, "{:?}", c.actuators.worst);
+        // the series are the actuators: the certificate of a serial robot
+        let exact = certify(&own.actuator_robot(), &t.fourier).unwrap();
+        for (a, b) in c.actuators.joints.iter().zip(&exact.joints) {
+            assert_eq!(a.position.bounds, b.position.bounds);
+            assert_eq!(a.jerk.bound, b.jerk.bound);
+        }
+        // the platform follows exactly
+        let at = |s: &Samples| own.platform_motion(s).unwrap().into_owned();
+        let [velocity, acceleration] = differences(&t.fourier, at);
+        println!("{name}: differences {velocity:.1e} {acceleration:.1e}");
+        assert!(velocity < 1e-8 && acceleration < 1e-6);
+        // the same torques as in the coordinates of the platform
+        let s = t.fourier.motion(50);
+        let (a, b) = (
+            own.nominal_torque(&s).unwrap(),
+            mechanism(&plant).nominal_torque(&at(&s)).unwrap(),
+        );
+        // at rest, sample 0, the sign of Coulomb friction is that of rounding
+        let off = (0..a.len())
+            .filter(|i| i % 50 != 0)
+            .map(|i| (a[i] - b[i]).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-8);
+        // judged from the file, by the robot as it is loaded
+        let read = Trajectory::parse(&t.to_json().unwrap(), "t.json").unwrap();
+        assert_eq!(read, *t);
+        let condition = |t: &Trajectory| {
+            let a = Assessment::with_plant(&plant, t).unwrap();
+            let e = a.excitation.unwrap();
+            assert!(e.certificate.satisfied, "{:?}", e.certificate.worst);
+            e.condition.normalised
+        };
+        let platform = run(mechanism(&plant), &settings).trajectory;
+        let [actuators, platform] = [condition(&read), condition(&platform)];
+        println!("{name}: condition of actuator series {actuators:.1}, platform {platform:.1}");
+        assert!(actuators < most && actuators < 3.0 * platform, "{name}");
+        if name == "delta" {
+            check_at_100_khz(&own, &t.fourier);
+        }
+    }
+}
+
+#[test]
+fn actuators_that_are_redundant_have_no_series_of_their_own() {
+    let e = common::tripod::build(4, 1).unwrap().in_actuators();
+    assert!(e.unwrap_err().to_string().contains("4 actuators"));
+    let three = common::tripod::build(3, 1).unwrap().in_actuators().unwrap();
+    let again = three.in_actuators().unwrap();
+    assert_eq!(again.task_names, ["slide0", "slide1", "slide2"]);
+    assert_eq!(again.platform().task_names, ["x", "y", "z"]);
 }
 
 #[test]

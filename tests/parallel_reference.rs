@@ -141,6 +141,82 @@ fn lumped_h4_torques() {
     }
 }
 
+/// Random states of the size of the reference cases: `x` in a box about (0, 0, −0.44, 0), up to
+/// 30 m/s² and 80 rad/s² (the reference states the cases, not the box).
+fn h4_states(count: usize) -> Samples {
+    let r = &mut common::rng(21);
+    let half = [
+        [0.12, 0.12, 0.07, 0.5],
+        [1.5, 1.5, 1.5, 3.5],
+        [30.0, 30.0, 30.0, 80.0],
+    ];
+    let mut x = Samples::zeros(4, count);
+    for (half, to) in half.iter().zip([&mut x.q, &mut x.qd, &mut x.qdd]) {
+        for k in 0..4 {
+            for v in &mut to[k * count..(k + 1) * count] {
+                *v = half[k] * r.random_range(-1.0..1.0);
+            }
+        }
+    }
+    x.q[2 * count..3 * count]
+        .iter_mut()
+        .for_each(|z| *z -= 0.44);
+    x
+}
+
+/// The torque error of the lumped model that the reference states, 6.3 %: nominal values, weight of
+/// the arms counted, no friction, relative to the torques of all rods.
+#[test]
+fn lumped_forearms_leave_what_the_reference_states() {
+    let Some(folder) = checks() else {
+        return println!("reference folder absent: nothing to compare with");
+    };
+    let text = std::fs::read_to_string(folder.join("h4_cases.json")).unwrap();
+    let file: Value = serde_json::from_str(&text).unwrap();
+    let stated = file["lumped_model_rel_rms_error"].as_f64().unwrap();
+    let (model, cases) = reference("h4");
+    let build = |model_of: Model, terms: &[JointTerm]| {
+        let mut robot = h4(&model);
+        robot.model = model_of;
+        robot.identify = terms.to_vec();
+        robot.build().unwrap()
+    };
+    let relative = |own: &[f64], truth: &[f64]| {
+        let square = |x: f64| x * x;
+        let off: f64 = own.iter().zip(truth).map(|(a, b)| square(a - b)).sum();
+        (off / truth.iter().map(|t| square(*t)).sum::<f64>()).sqrt()
+    };
+    let rods = build(Model::Rods, &[]);
+    let lumped = build(Model::LumpedGravity, &[]);
+    let column = |key: &str| -> Vec<f64> { cases.iter().flat_map(|c| numbers(&c[key])).collect() };
+    let of_cases = relative(&column("tau_lumped_model"), &column("tau_numpy"));
+    let x = h4_states(4000);
+    let truth = rods.nominal_torque(&x).unwrap();
+    let of_states = relative(&lumped.nominal_torque(&x).unwrap(), &truth);
+    println!(
+        "nominal, with the weight of the arms: stated {stated:.4}, 12 cases {of_cases:.4}, 4000 states {of_states:.4}"
+    );
+    assert!((of_cases - stated).abs() < 2e-3 && (of_states - stated).abs() < 5e-3);
+    // parameters identified without noise leave more (no weight of the arms) or less (with it)
+    let left = [(Model::Lumped, 14), (Model::LumpedGravity, 18)].map(|(model, count)| {
+        let m = build(model, &[JointTerm::Viscous, JointTerm::Coulomb]);
+        assert_eq!(m.parameters.list.len(), count);
+        let w = m.regressor(&x).unwrap();
+        let w = DMatrix::from_fn(w.nrows(), w.ncols(), |i, k| w[(i, k)]);
+        let tau = nalgebra::DVector::from_column_slice(&truth);
+        let phi = w.clone().svd(true, true).solve(&tau, 1e-9).unwrap();
+        relative((w * phi).as_slice(), &truth)
+    });
+    println!(
+        "identified: 14 parameters {:.4}, 18 parameters {:.4}",
+        left[0], left[1]
+    );
+    assert!(
+        (0.09..0.13).contains(&left[0]) && left[1] < 0.03,
+        "{left:?}"
+    );
+}
+
 /// Base parameters over random motions in a box about home.
 fn base(mechanism: &Mechanism) -> BaseParameters {
     let m = mechanism.freedoms();

@@ -52,6 +52,7 @@ fn motion(robot: &Robot, size: f64) -> Trajectory {
         robot_hash: robot.hash.clone(),
         joints: robot.joint_names(),
         kind: Default::default(),
+        space: None,
         fourier,
         periods: 3,
         ends: Ends::Rest,

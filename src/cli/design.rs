@@ -10,7 +10,7 @@ use excite::identifiability::Assessment;
 use excite::output::prepare_dir;
 use excite::report::before;
 use excite::trajectory::samples::write_samples;
-use excite::trajectory::{Ends, Grid, Trajectory};
+use excite::trajectory::{Ends, Grid, Space, Trajectory};
 use excite::{Error, Plant, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -22,12 +22,12 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(
     long_about = "Design an exciting trajectory: a Fourier series for each joint (for each coordinate of \
-                  the platform, of a parallel robot) that minimises the \
+                  the platform, or each actuator, of a parallel robot) that minimises the \
                   condition number of the regressor (or another criterion), inside position, \
                   velocity, acceleration, jerk and torque limits for all time.\n\nWrites \
                   trajectory.json, samples.csv, report.json and report.html. Ctrl-C keeps the best \
                   trajectory found so far.",
-    after_help = "Examples:\n  excite design panda --output out\n  excite design hexapod --output out\n  excite design robot.toml --harmonics 7 \
+    after_help = "Examples:\n  excite design panda --output out\n  excite design hexapod --output out\n  excite design delta --coordinates actuators\n  excite design robot.toml --harmonics 7 \
                   --period 20 --derate 0.8 --time-limit 60\n  excite design arm.urdf --criterion d \
                   --identify armature,viscous,coulomb\n  excite design robot.toml --diagnostic --output diagnostic"
 )]
@@ -60,7 +60,11 @@ pub struct Args {
     /// Ends: rest (zero velocity and acceleration) or free
     #[arg(long, default_value = "rest")]
     ends: Ends,
-    /// Posture at the start, rad or m, one number per joint [default: free]
+    /// What the Fourier series of a parallel robot move: the coordinates of its platform, or the
+    /// positions of its actuators [default: platform, where there is one]
+    #[arg(long, value_name = "platform|actuators", value_parser = named::<Space>)]
+    coordinates: Option<Space>,
+    /// Posture at the start, rad or m, one number per joint (or coordinate) [default: free]
     #[arg(
         long,
         value_name = "Q1,Q2,…",
@@ -109,7 +113,7 @@ fn named<T: serde::de::DeserializeOwned>(text: &str) -> std::result::Result<T, S
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let plant = load(&args.robot, args.identify.as_deref())?;
+    let plant = load(&args.robot, args.identify.as_deref())?.in_space(args.coordinates)?;
     let settings = Settings {
         harmonics: args.harmonics,
         period: args.period,

@@ -42,9 +42,12 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let plant = load(&args.robot, args.identify.as_deref())?;
+    let mut plant = load(&args.robot, args.identify.as_deref())?;
     let trajectory = args.trajectory.as_ref().map(Trajectory::read).transpose()?;
     if let (Some(t), Some(path)) = (&trajectory, &args.trajectory) {
+        plant = plant
+            .in_space(t.space)
+            .map_err(|e| Error::file(path, "coordinates", e.to_string()))?;
         t.matches(&plant.moved())
             .map_err(|e| Error::file(path, "", e.to_string()))?;
     }

@@ -138,8 +138,10 @@ enum Control {
 }
 
 pub fn run(args: Args) -> Result<()> {
-    let plant = Plant::load(&args.robot)?;
     let trajectory = Trajectory::read(&args.trajectory)?;
+    let plant = Plant::load(&args.robot)?
+        .in_space(trajectory.space)
+        .map_err(|e| Error::file(&args.trajectory, "coordinates", e.to_string()))?;
     let names = plant.coordinate_names();
     if trajectory.joints != names {
         return Err(Error::file(

@@ -1,6 +1,8 @@
 //! Limits of a closed chain along a motion of its platform: position, velocity, acceleration, jerk
 //! and force of the actuators, cones of the passive joints, margins from both singularities,
-//! distances between legs.
+//! distances between legs. Along a motion of its actuators, whose own limits are those of their
+//! series ([`Limits`](super::limits::Limits)): forces, the workspace box of the platform, and the same
+//! limits of its pose.
 //!
 //! ```text
 //! q = F(x)    q̇ = D ẋ    q̈ = D ẍ + F_xx[ẋ, ẋ]
@@ -23,9 +25,13 @@ const STEP: f64 = 1e-6;
 /// A row is kept where a use peaks in time, and wherever it is above this.
 const TIGHT: f64 = 0.96;
 
-/// A limit of an actuator on its position, velocity, acceleration, jerk or force.
+/// A limit of a coordinate of the tree on its position, velocity, acceleration or jerk, or of an
+/// actuator on its force.
 #[derive(Debug, Clone, Copy)]
 struct Band {
+    /// coordinate of the tree
+    joint: usize,
+    /// the actuator that it is, of a force
     actuator: usize,
     /// 0 position, 1 velocity, 2 acceleration, 3 jerk, 4 force
     order: usize,
@@ -38,6 +44,8 @@ struct Band {
 pub(super) struct ClosedLimits<'a> {
     mechanism: &'a Mechanism,
     bands: Vec<Band>,
+    /// coordinates of the tree that are the pose, where the series are not those of the pose
+    platform: Vec<usize>,
     pairs: Vec<(usize, usize)>,
     /// time between samples, s
     step: f64,
@@ -50,14 +58,31 @@ impl<'a> ClosedLimits<'a> {
     /// period.
     pub fn new(mechanism: &'a Mechanism, derate: f64, period: f64, count: usize) -> Self {
         let mut bands = Vec::new();
-        for (actuator, &j) in mechanism.actuated.iter().enumerate() {
-            let l = &mechanism.robot.joints[j].limits;
+        let platform = match mechanism.geometry().platform() {
+            Some(_) => mechanism.platform_rows(),
+            None => Vec::new(),
+        };
+        let given = mechanism.task_joints();
+        let box_of = &mechanism.platform().workspace;
+        let limits = |&j: &usize| mechanism.robot.joints[j].limits;
+        let actuators = mechanism.actuated.iter().map(|j| (*j, limits(j)));
+        let follows = platform.iter().zip(box_of).map(|(j, l)| (*j, *l));
+        for (i, (joint, l)) in actuators.chain(follows).enumerate() {
             let [low, high] = l.position;
+            let series = given.iter().position(|&j| j == joint);
+            // the series keeps its own limits for all time
+            let kept = |order: usize| {
+                series.is_some_and(|k| {
+                    let [from, to] = mechanism.workspace[k].position;
+                    (1..4).contains(&order) || order == 0 && low <= from && to <= high
+                })
+            };
             let mut add = |order: usize, middle: f64, half: f64| {
-                if half.is_finite() && middle.is_finite() {
+                if half.is_finite() && middle.is_finite() && !kept(order) {
                     let half = half * derate * (1.0 - BETWEEN);
                     bands.push(Band {
-                        actuator,
+                        joint,
+                        actuator: i,
                         order,
                         middle,
                         half,
@@ -83,6 +108,7 @@ impl<'a> ClosedLimits<'a> {
         ClosedLimits {
             mechanism,
             bands,
+            platform,
             pairs: mechanism.pairs(),
             step: period / count as f64,
             derate,
@@ -93,7 +119,7 @@ impl<'a> ClosedLimits<'a> {
     fn values(&self, band: &Band, memory: &PathMemory, out: &mut Vec<f64>) {
         let tree = &memory.closed.motion.tree;
         let n = tree.count;
-        let at = self.mechanism.actuated[band.actuator] * n;
+        let at = band.joint * n;
         out.clear();
         match band.order {
             0 => out.extend_from_slice(&tree.q[at..at + n]),
@@ -130,15 +156,21 @@ impl<'a> ClosedLimits<'a> {
         true
     }
 
-    fn pose(motion: &Samples, s: usize) -> Vec<f64> {
-        (0..motion.dof)
-            .map(|k| motion.q[k * motion.count + s])
-            .collect()
+    /// Pose at sample `s` of a motion that is in the memory.
+    fn pose(&self, motion: &Samples, memory: &PathMemory, s: usize) -> Vec<f64> {
+        let n = motion.count;
+        match self.platform.is_empty() {
+            true => (0..motion.dof).map(|k| motion.q[k * n + s]).collect(),
+            false => {
+                let tree = &memory.closed.motion.tree;
+                self.platform.iter().map(|j| tree.q[j * n + s]).collect()
+            }
+        }
     }
 
     /// Uses of all limits of the pose at sample `s`.
     fn pose_uses(&self, x: &[f64]) -> Vec<f64> {
-        let uses = self.mechanism.pose_uses(x, &self.pairs);
+        let uses = self.mechanism.platform().pose_uses(x, &self.pairs);
         let room = self.derate * (1.0 - BETWEEN);
         uses.iter().map(|u| u.used() / room).collect()
     }
@@ -172,15 +204,16 @@ impl<'a> ClosedLimits<'a> {
         let size = dof * m * n;
         let [mut d, mut dqd, mut dqdd] = [vec![0.0; size], vec![0.0; size], vec![0.0; size]];
         let isa = memory.closed.tree.isa();
-        self.mechanism
-            .geometry()
-            .sensitivity(isa, motion, &mut d, &mut dqd, &mut dqdd);
-        let forces = self
-            .bands
-            .iter()
-            .zip(&near)
-            .any(|(b, near)| b.order == 4 && !near.is_empty());
-        if forces {
+        let any = |force: bool| {
+            let mut all = self.bands.iter().zip(&near);
+            all.any(|(b, near)| (b.order == 4) == force && !near.is_empty())
+        };
+        if any(false) {
+            self.mechanism
+                .geometry()
+                .sensitivity(isa, motion, &mut d, &mut dqd, &mut dqdd);
+        }
+        if any(true) {
             // one vector for each actuator, with a unit rate of it
             let mut rates = vec![0.0; na * na * n];
             for a in 0..na {
@@ -206,7 +239,7 @@ impl<'a> ClosedLimits<'a> {
             info.pull_back(s, [&x, &xd, &row(&d, j, s, 1.0)])
         };
         for (band, near) in self.bands.iter().zip(near) {
-            let j = self.mechanism.actuated[band.actuator];
+            let j = band.joint;
             for (s, signed) in near {
                 let mut gradient = match band.order {
                     0 => info.pull_back(s, [&row(&d, j, s, 1.0), &none, &none]),
@@ -242,10 +275,17 @@ impl<'a> ClosedLimits<'a> {
     }
 
     /// Rows of what depends on the pose alone.
-    fn pose_rows(&self, info: &Information, motion: &Samples, from: f64, rows: &mut Vec<PathRow>) {
+    fn pose_rows(
+        &self,
+        info: &Information,
+        motion: &Samples,
+        memory: &PathMemory,
+        from: f64,
+        rows: &mut Vec<PathRow>,
+    ) {
         let (n, m) = (motion.count, motion.dof);
         let uses: Vec<Vec<f64>> = (0..n)
-            .map(|s| self.pose_uses(&Self::pose(motion, s)))
+            .map(|s| self.pose_uses(&self.pose(motion, memory, s)))
             .collect();
         let kinds = uses.first().map_or(0, Vec::len);
         let mut wanted: Vec<Vec<usize>> = vec![Vec::new(); n];
@@ -260,7 +300,7 @@ impl<'a> ClosedLimits<'a> {
             if wanted.is_empty() {
                 continue;
             }
-            let x = Self::pose(motion, s);
+            let x = self.pose(motion, memory, s);
             let mut slopes = vec![vec![0.0; m]; kinds];
             for k in 0..m {
                 let shifted = |h: f64| {
@@ -271,6 +311,17 @@ impl<'a> ClosedLimits<'a> {
                 let (up, down) = (shifted(STEP), shifted(-STEP));
                 for (slope, (u, d)) in slopes.iter_mut().zip(up.iter().zip(&down)) {
                     slope[k] = (u - d) / (2.0 * STEP);
+                }
+            }
+            if !self.platform.is_empty() {
+                // ∂x/∂q_a: rows of D
+                let d = &memory.closed.motion.d;
+                for slope in &mut slopes {
+                    let along = |i: usize| {
+                        let rows = self.platform.iter().zip(slope.iter());
+                        rows.map(|(j, g)| g * d[(j * m + i) * n + s]).sum()
+                    };
+                    *slope = (0..m).map(along).collect();
                 }
             }
             for &k in wanted {
@@ -310,14 +361,14 @@ impl<'a> ClosedLimits<'a> {
         let mut worst = (used, String::new());
         if let Some(band) = self.bands.get(at) {
             const WHAT: [&str; 5] = ["position", "velocity", "acceleration", "jerk", "force"];
-            let joint = &self.mechanism.robot.joints[self.mechanism.actuated[band.actuator]];
+            let joint = &self.mechanism.robot.joints[band.joint];
             worst.1 = format!("{} of {}", WHAT[band.order], joint.name);
         }
         for s in 0..motion.count {
-            let x = Self::pose(motion, s);
+            let x = self.pose(motion, memory, s);
             for (k, used) in self.pose_uses(&x).into_iter().enumerate() {
                 if used > worst.0 || used.is_nan() {
-                    let uses = self.mechanism.pose_uses(&x, &self.pairs);
+                    let uses = self.mechanism.platform().pose_uses(&x, &self.pairs);
                     worst = (used, uses[k].name.clone());
                 }
             }
@@ -350,7 +401,7 @@ impl PathLimits for ClosedLimits<'_> {
             return most;
         }
         for s in 0..motion.count {
-            for used in self.pose_uses(&Self::pose(motion, s)) {
+            for used in self.pose_uses(&self.pose(motion, memory, s)) {
                 most = most.max(used);
             }
         }
@@ -365,7 +416,7 @@ impl PathLimits for ClosedLimits<'_> {
         }
         let from = from.min(0.7);
         self.band_rows(info, &e.motion, &mut memory, from, &mut rows);
-        self.pose_rows(info, &e.motion, from, &mut rows);
+        self.pose_rows(info, &e.motion, &memory, from, &mut rows);
         rows
     }
 

@@ -37,7 +37,7 @@ use crate::identifiability::{certificate, torque_noise};
 use crate::mechanism::{Mechanism, closed_certificate};
 use crate::plant::Plant;
 use crate::robot::{JointTerm, Motion, Robot};
-use crate::trajectory::{Basis, Fourier, Trajectory};
+use crate::trajectory::{Basis, Fourier, Space, Trajectory};
 use closed_limits::ClosedLimits;
 use criterion::Objective;
 use information::Information;
@@ -171,6 +171,7 @@ pub fn design(
         info: &info,
         limits: Limits::new(&robot, &basis, settings.period, settings.derate),
         path: torque.as_ref().map(|t| t as &dyn PathLimits),
+        space: None,
         certified: &|fourier| Ok(certificate(&derated, &tree, fourier)?.satisfied),
     }
     .solve(begin, interrupt, progress)
@@ -192,9 +193,10 @@ pub fn design_plant(
     }
 }
 
-/// Designs an exciting trajectory of the platform of a closed chain: a Fourier series for each task
-/// coordinate, inside the workspace box and the limits of actuators, passive joints and
-/// singularities. [`Design::robot`] has the task coordinates as its joints.
+/// Designs an exciting trajectory of a closed chain: a Fourier series for each task coordinate (of
+/// the platform, or of the actuators of [`Mechanism::in_actuators`] and of loops), inside the
+/// workspace box and the limits of actuators, passive joints and singularities. [`Design::robot`] has
+/// the task coordinates as its joints.
 ///
 /// # Errors
 /// As [`design`].
@@ -231,6 +233,7 @@ pub fn design_closed(
         info: &info,
         limits: limits.resting(&mechanism.home),
         path: Some(&path),
+        space: Some(mechanism.space()),
         certified: &|fourier| Ok(closed_certificate(mechanism, fourier, settings.derate)?.satisfied),
     }
     .solve(begin, interrupt, progress)
@@ -269,6 +272,8 @@ struct Problem<'a> {
     info: &'a Information<'a>,
     limits: Limits,
     path: Option<&'a dyn PathLimits>,
+    /// what the series move, of a closed chain
+    space: Option<Space>,
     /// whether a motion keeps all limits for all time
     certified: &'a dyn Fn(&Fourier) -> Result<bool>,
 }
@@ -334,6 +339,7 @@ impl Problem<'_> {
         };
         let fourier = self.settle(iterate.x)?;
         let trajectory = Trajectory {
+            space: self.space,
             periods: settings.periods,
             ends: settings.ends,
             grid: settings.grid,

@@ -81,6 +81,27 @@ impl Samples {
         s
     }
 
+    /// The motion of these coordinates alone.
+    ///
+    /// # Panics
+    /// If there is no such coordinate.
+    pub fn rows(&self, rows: &[usize]) -> Samples {
+        let n = self.count;
+        let pick = |a: &[f64]| {
+            rows.iter()
+                .flat_map(|&j| &a[j * n..(j + 1) * n])
+                .copied()
+                .collect()
+        };
+        Samples {
+            dof: rows.len(),
+            count: n,
+            q: pick(&self.q),
+            qd: pick(&self.qd),
+            qdd: pick(&self.qdd),
+        }
+    }
+
     /// Position, velocity and acceleration of joint `j` at sample `i`.
     pub fn at(&self, j: usize, i: usize) -> [f64; 3] {
         let k = j * self.count + i;

@@ -5,8 +5,8 @@ use crate::dynamics::Samples;
 use crate::error::{Result, Warning};
 use crate::mechanism::{ClosedCertificate, Mechanism, closed_certificate};
 use crate::plant::Plant;
-use crate::trajectory::Trajectory;
 use crate::trajectory::certificate::{Certificate, Kind, Worst};
+use crate::trajectory::{Space, Trajectory};
 
 pub(super) fn assess(
     plant: &Plant,
@@ -29,7 +29,8 @@ pub(super) fn assess(
         ));
     }
     let certificate = overall(&closed);
-    let platform = platform(mechanism, motion, closed);
+    let moved = mechanism.platform_motion(&motion)?.into_owned();
+    let platform = platform(mechanism.platform(), mechanism.space(), moved, closed);
     all.excite(
         trajectory,
         actuators,
@@ -84,7 +85,12 @@ fn overall(closed: &ClosedCertificate) -> Certificate {
     }
 }
 
-fn platform(mechanism: &Mechanism, motion: Samples, certificate: ClosedCertificate) -> Platform {
+fn platform(
+    mechanism: &Mechanism,
+    space: Space,
+    motion: Samples,
+    certificate: ClosedCertificate,
+) -> Platform {
     let pairs = mechanism.pairs();
     let n = motion.count;
     let pose = |s: usize| -> Vec<f64> { (0..motion.dof).map(|k| motion.q[k * n + s]).collect() };
@@ -132,6 +138,7 @@ fn platform(mechanism: &Mechanism, motion: Samples, certificate: ClosedCertifica
     Platform {
         task: mechanism.task,
         names: mechanism.task_names.clone(),
+        space,
         motion,
         certificate,
         uses,

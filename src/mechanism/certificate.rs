@@ -20,6 +20,10 @@
 //!
 //! with the largest second difference of all samples, doubled, for `ü`: a bound that is **stated**,
 //! not proven; as is that of a mechanism without closed form, for all of it.
+//!
+//! Where the series are those of the actuators ([`Mechanism::in_actuators`], and loops), it is the
+//! other way round: the actuators are exact, by the extrema of their series as for a serial robot,
+//! and the box of a platform that follows is sampled with the stated bound.
 
 use super::dynamics::slice;
 use super::geometry::Path;
@@ -28,6 +32,7 @@ use super::margins::PoseKind;
 use super::{ClosedWorkspace, Mechanism};
 use crate::dynamics::Samples;
 use crate::error::Result;
+use crate::robot::{Limits, Robot};
 use crate::trajectory::certificate::{Certificate, JointCertificate, Peak, Range, TOLERANCE};
 use crate::trajectory::{Extremum, Fourier, TorqueBound, certify};
 
@@ -41,13 +46,15 @@ const MISSING: f64 = 1e-3;
 /// What is known of the limits of a closed chain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosedCertificate {
-    /// the workspace box: exact, task coordinates as joints
+    /// the workspace box, coordinates of the platform as joints: exact where the series are theirs,
+    /// else sampled with a stated bound
     pub platform: Certificate,
     /// the actuators
     pub actuators: Certificate,
     /// passive joints, singularities, distances
     pub pose: Vec<PosePeak>,
-    /// whether the kinematic limits of the actuators are proven (closed-form kinematics)
+    /// whether the kinematic limits of the actuators are proven (series of the actuators, or
+    /// closed-form kinematics)
     pub proven: bool,
     /// whether every limit holds
     pub satisfied: bool,
@@ -82,6 +89,21 @@ struct Reach {
     bounds: [f64; 2],
     peak: [Extremum; 3],
     bound: [f64; 3],
+}
+
+impl Reach {
+    /// Against limits, without a torque.
+    fn certificate(&self, joint: &str, limits: &Limits) -> JointCertificate {
+        let peak = |k: usize, limit: f64| Peak::new(self.peak[k], self.bound[k], limit);
+        JointCertificate {
+            joint: joint.to_string(),
+            position: Range::new(self.low, self.high, self.bounds, limits.position),
+            velocity: peak(0, limits.velocity),
+            acceleration: peak(1, limits.acceleration),
+            jerk: peak(2, limits.jerk),
+            torque: None,
+        }
+    }
 }
 
 impl Default for Reach {
@@ -223,7 +245,6 @@ pub fn closed_certificate(
     fourier: &Fourier,
     derate: f64,
 ) -> Result<ClosedCertificate> {
-    let platform = certify(&mechanism.task_robot(), fourier)?;
     let mut actuators = mechanism.actuator_robot();
     for joint in &mut actuators.joints {
         let l = &mut joint.limits;
@@ -238,7 +259,8 @@ pub fn closed_certificate(
         l.effort *= derate;
     }
     let samples = fourier.motion(SAMPLES);
-    let (reach, proven) = actuator_reach(mechanism, fourier, &actuators, &samples)?;
+    let platform = platform_certificate(mechanism, fourier, &samples)?;
+    let (kinematic, proven) = actuator_certificates(mechanism, fourier, &actuators, &samples)?;
     let mut ws = ClosedWorkspace::default();
     let n = samples.count;
     let na = mechanism.actuators();
@@ -276,15 +298,7 @@ pub fn closed_certificate(
             let limit = joint.limits.effort;
             let limit = limit.is_finite().then_some(limit);
             let value = most + coulomb;
-            let r = &reach[a];
-            let l = &joint.limits;
-            let peak = |k: usize, limit: f64| Peak::new(r.peak[k], r.bound[k], limit);
             JointCertificate {
-                joint: joint.name.clone(),
-                position: Range::new(r.low, r.high, r.bounds, l.position),
-                velocity: peak(0, l.velocity),
-                acceleration: peak(1, l.acceleration),
-                jerk: peak(2, l.jerk),
                 torque: Some(TorqueBound {
                     joint: joint.name.clone(),
                     max_on_grid: most,
@@ -296,11 +310,13 @@ pub fn closed_certificate(
                     used: limit.map(|l| value / l),
                     margin: limit.map(|l| l - value),
                 }),
+                ..kinematic[a].clone()
             }
         })
         .collect();
     let actuators = Certificate::new(joints);
-    let pose = pose_peaks(mechanism, &samples, step, derate);
+    let poses = mechanism.platform_motion(&samples)?;
+    let pose = pose_peaks(mechanism.platform(), &poses, step, derate);
     let satisfied = platform.satisfied && actuators.satisfied && pose.iter().all(|p| p.satisfied);
     Ok(ClosedCertificate {
         platform,
@@ -311,12 +327,66 @@ pub fn closed_certificate(
     })
 }
 
+/// The workspace box. Exact where the series are those of the platform (or of the joints that the
+/// box is about); otherwise sampled with the stated bound.
+fn platform_certificate(
+    mechanism: &Mechanism,
+    fourier: &Fourier,
+    samples: &Samples,
+) -> Result<Certificate> {
+    if mechanism.geometry().platform().is_none() {
+        return certify(&mechanism.task_robot(), fourier);
+    }
+    let reach = sampled_reach(&*mechanism.platform_motion(samples)?, fourier.period);
+    let joints = mechanism.platform().task_robot().joints;
+    let all = reach.iter().zip(&joints);
+    Ok(Certificate::new(
+        all.map(|(r, joint)| r.certificate(&joint.name, &joint.limits))
+            .collect(),
+    ))
+}
+
+/// Position, velocity, acceleration and jerk of the actuators, and whether all of it is proven:
+/// exact for those whose series is given, as for a serial robot.
+fn actuator_certificates(
+    mechanism: &Mechanism,
+    fourier: &Fourier,
+    actuators: &Robot,
+    samples: &Samples,
+) -> Result<(Vec<JointCertificate>, bool)> {
+    let given: Vec<Option<usize>> = (mechanism.actuated.iter())
+        .map(|a| mechanism.task_joints().iter().position(|j| j == a))
+        .collect();
+    let (mut all, mut proven) = (Vec::new(), true);
+    if given.contains(&None) {
+        let (reach, enclosed) = actuator_reach(mechanism, fourier, actuators, samples)?;
+        let each = reach.iter().zip(&actuators.joints);
+        all.extend(each.map(|(r, joint)| r.certificate(&joint.name, &joint.limits)));
+        proven = enclosed;
+    }
+    let mut moved = mechanism.task_robot();
+    for (joint, k) in actuators.joints.iter().zip(&given) {
+        if let Some(k) = *k {
+            moved.joints[k] = joint.clone();
+        }
+    }
+    let exact = certify(&moved, fourier)?.joints;
+    for (a, k) in given.into_iter().enumerate() {
+        match (k, all.get_mut(a)) {
+            (Some(k), Some(own)) => *own = exact[k].clone(),
+            (Some(k), None) => all.push(exact[k].clone()),
+            (None, _) => {}
+        }
+    }
+    Ok((all, proven))
+}
+
 /// What the actuators reach: proven where the kinematics has a closed form, else sampled with the
 /// stated bound.
 fn actuator_reach(
     mechanism: &Mechanism,
     fourier: &Fourier,
-    actuators: &crate::robot::Robot,
+    actuators: &Robot,
     samples: &Samples,
 ) -> Result<(Vec<Reach>, bool)> {
     let omega = fourier.omega();
@@ -347,12 +417,18 @@ fn actuator_reach(
         return Ok((prover.reach, true));
     }
     let motion = mechanism.motion(samples)?.tree;
-    let n = samples.count;
-    let step = fourier.period / n as f64;
-    let reach = mechanism
-        .actuated
-        .iter()
-        .map(|&j| {
+    Ok((
+        sampled_reach(&motion.rows(&mechanism.actuated), fourier.period),
+        false,
+    ))
+}
+
+/// What the rows of a cyclic motion reach at the samples, with the stated bound between them.
+fn sampled_reach(motion: &Samples, period: f64) -> Vec<Reach> {
+    let n = motion.count;
+    let step = period / n as f64;
+    (0..motion.dof)
+        .map(|j| {
             let rows = j * n..(j + 1) * n;
             let (q, qd, qdd) = (
                 &motion.q[rows.clone()],
@@ -392,8 +468,7 @@ fn actuator_reach(
             }
             reach
         })
-        .collect();
-    Ok((reach, false))
+        .collect()
 }
 
 /// Passive joints, singularities and distances at the samples, with the stated bound between them.

@@ -12,6 +12,7 @@
 //! q = F(x)     q̇ = D ẋ     q̈ = D ẍ + F_xx[ẋ, ẋ]
 //! ```
 
+use super::Mechanism;
 use super::loops::Closure;
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
@@ -127,6 +128,12 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
     /// Where the task coordinates are joints: which of the tree coordinates they are. `None`: the
     /// first actuators.
     fn task_joints(&self) -> Option<&[usize]> {
+        None
+    }
+
+    /// The mechanism in the coordinates of its platform, where the task coordinates are its
+    /// actuators in their place, see [`Mechanism::in_actuators`].
+    fn platform(&self) -> Option<&Mechanism> {
         None
     }
 

@@ -18,6 +18,7 @@
 // the functions that are compiled for them
 #![allow(clippy::needless_range_loop)]
 
+mod actuators;
 pub mod bundled;
 mod certificate;
 pub mod delta;
@@ -52,6 +53,7 @@ pub use task::{PlatformMotion, Task};
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
 use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
+use std::sync::Arc;
 
 /// What a mechanism is put together from.
 #[derive(Debug)]
@@ -75,7 +77,7 @@ pub struct Setup {
 }
 
 /// A closed chain. See the [module](self) documentation.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Mechanism {
     /// `gough-stewart`, `h4`, `delta`, `loops`
     pub kind: &'static str,
@@ -102,7 +104,7 @@ pub struct Mechanism {
     pub warnings: Vec<Warning>,
     /// text of the robot file it was read from; empty where it was put together in code
     pub source: String,
-    geometry: Box<dyn Geometry>,
+    geometry: Arc<dyn Geometry>,
     tree: Tree,
 }
 
@@ -202,7 +204,7 @@ impl Mechanism {
             margins: Margins::default(),
             warnings,
             source: String::new(),
-            geometry,
+            geometry: Arc::from(geometry),
             tree,
         };
         mechanism.check_home()?;
@@ -234,12 +236,19 @@ impl Mechanism {
         self.task.count()
     }
 
+    /// Tree coordinates that the task coordinates are; none where they are the pose of a platform.
+    pub fn task_joints(&self) -> &[usize] {
+        match self.task {
+            Task::Joints(m) => self.geometry.task_joints().unwrap_or(&self.actuated[..m]),
+            _ => &[],
+        }
+    }
+
     /// Whether task coordinate `k` is an angle: of the platform, or of a joint that turns.
     pub fn is_angle(&self, k: usize) -> bool {
-        let joints = self.geometry.task_joints().unwrap_or(&self.actuated);
-        match (self.task, joints.get(k)) {
-            (Task::Joints(_), Some(&j)) => self.robot.joints[j].motion == Motion::Revolute,
-            (task, _) => task.is_angle(k),
+        match self.task_joints().get(k) {
+            Some(&j) => self.robot.joints[j].motion == Motion::Revolute,
+            None => self.task.is_angle(k),
         }
     }
 
@@ -300,23 +309,23 @@ impl Mechanism {
     }
 
     /// The task coordinates as the joints of a robot without bodies, their limits the workspace
-    /// box: what trajectories, their limits and their files are about.
+    /// box (and, where they are joints, those of their rates): what trajectories, their limits and
+    /// their files are about.
     pub fn task_robot(&self) -> Robot {
         let joints = self.task_names.iter().enumerate().map(|(k, name)| {
-            let angle = match self.task {
-                Task::Joints(_) => {
-                    let joints = self.geometry.task_joints().unwrap_or(&self.actuated);
-                    let joint = joints.get(k).and_then(|&j| self.robot.joints.get(j));
-                    joint.is_some_and(|j| j.motion == Motion::Revolute)
-                }
-                _ => self.task.is_angle(k),
-            };
-            let motion = match angle {
+            let motion = match self.is_angle(k) {
                 true => Motion::Revolute,
                 false => Motion::Prismatic,
             };
+            let mut limits = self.workspace[k];
+            if let Some(&j) = self.task_joints().get(k) {
+                let own = self.robot.joints[j].limits;
+                limits.velocity = limits.velocity.min(own.velocity);
+                limits.acceleration = limits.acceleration.min(own.acceleration);
+                limits.jerk = limits.jerk.min(own.jerk);
+            }
             Joint {
-                limits: self.workspace[k],
+                limits,
                 ..Joint::new(name, motion)
             }
         });

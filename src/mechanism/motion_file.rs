@@ -22,7 +22,7 @@ const POSE: [&str; 19] = [
 ];
 
 impl Mechanism {
-    /// Writes a motion of the task coordinates as CSV at `rate` hertz for so many periods, end point
+    /// Writes a motion of the task coordinates (the platform's or the actuators') as CSV at `rate` hertz for so many periods, end point
     /// included: `t`, then `q1.. dq1.. ddq1.. tau1..` of the actuators (nominal forces), then the
     /// platform as [`Mechanism::read_motion`] reads it. Returns the number of samples.
     ///
@@ -42,12 +42,13 @@ impl Mechanism {
         for name in ["q", "dq", "ddq", "tau"] {
             header.extend((1..=na).map(|a| format!("{name}{a}")));
         }
-        match self.task {
+        let platform = self.platform().task;
+        match platform {
             Task::Joints(_) => {}
             Task::Pose => header.extend(POSE.iter().map(|c| c.to_string())),
             _ => {
                 for prefix in ["", "d", "dd"] {
-                    header.extend(self.task.names().iter().map(|n| format!("{prefix}{n}")));
+                    header.extend(platform.names().iter().map(|n| format!("{prefix}{n}")));
                 }
             }
         }
@@ -70,6 +71,7 @@ impl Mechanism {
             }
             let tree = self.motion(&x)?.tree;
             let tau = self.nominal_torque(&x)?;
+            let x = self.platform_of(&x, &tree);
             for (s, &t) in times.iter().enumerate() {
                 rows.push(t);
                 for a in [&tree.q, &tree.qd, &tree.qdd] {
@@ -78,7 +80,7 @@ impl Mechanism {
                 rows.extend((0..na).map(|a| tau[a * n + s]));
                 let at = |a: &[f64]| -> Vec<f64> { (0..m).map(|k| a[k * n + s]).collect() };
                 let (q, qd, qdd) = (at(&x.q), at(&x.qd), at(&x.qdd));
-                match (self.task, self.task.motion(&q, &qd, &qdd)) {
+                match (platform, platform.motion(&q, &qd, &qdd)) {
                     (Task::Joints(_), _) => {}
                     (Task::Pose, Some(p)) => {
                         let r = Rotation3::from_matrix_unchecked(p.rotation);

@@ -163,6 +163,9 @@ impl Mechanism {
     /// # Errors
     /// A pose that cannot be reached.
     pub fn singularity(&self, x: &[f64]) -> Result<Singularity> {
+        if let Some(platform) = self.geometry.platform() {
+            return platform.singularity(&platform.forward(x, &platform.home)?.x);
+        }
         Ok(Singularity {
             actuation: Spread::of(&self.actuation_jacobian(x)?),
             constraint: self

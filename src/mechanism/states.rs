@@ -10,6 +10,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Rates and accelerations where the workspace states none: of lengths (m/s, m/s²) and of angles.
 const RATES: [[f64; 2]; 2] = [[1.0, 10.0], [2.0, 20.0]];
+/// Distance from home where a coordinate has no range, m or rad.
+const REACH: f64 = 0.3;
 
 impl Mechanism {
     /// Random states: poses uniform in the workspace box, drawn towards home where they cannot be
@@ -22,7 +24,10 @@ impl Mechanism {
         let mut x = vec![0.0; m];
         for i in 0..count {
             for (k, x) in x.iter_mut().enumerate() {
-                let [low, high] = self.workspace[k].position;
+                let [low, high] = match self.workspace[k].position {
+                    [low, high] if (high - low).is_finite() => [low, high],
+                    _ => [self.home[k] - REACH, self.home[k] + REACH],
+                };
                 *x = low + (high - low) * rng.random_range(0.0..1.0);
             }
             let mut tries = 0;
@@ -58,7 +63,7 @@ impl Mechanism {
             })
     }
 
-    /// Base parameters of the unknowns of this mechanism.
+    /// Base parameters of the unknowns of this mechanism; the same in all coordinates.
     ///
     /// # Errors
     /// When the decomposition fails, which needs numbers that are not finite, or a state that
@@ -66,7 +71,8 @@ impl Mechanism {
     pub fn base(&self) -> Result<BaseParameters> {
         let list = &self.parameters.list;
         let count = (3 * list.len() / self.actuators().max(1)).max(60);
-        let w = self.regressor(&self.random_states(count, 0x0e_4c17e))?;
+        let platform = self.platform();
+        let w = platform.regressor(&platform.random_states(count, 0x0e_4c17e))?;
         let mut base = BaseParameters::from_matrix(
             list.iter().map(|p| p.name.clone()).collect(),
             list.iter().map(|p| p.unit).collect(),

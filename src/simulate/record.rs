@@ -220,13 +220,14 @@ fn poses(plant: &Plant, run: &Run) -> Result<Vec<Vec<f64>>> {
             plant.name()
         )));
     };
-    let m = run.motion.dof;
+    let motion = mechanism.platform_motion(&run.motion)?;
+    let m = motion.dof;
     let zero = vec![0.0; m];
     let mut columns: Vec<Vec<f64>> = (0..7).map(|_| Vec::with_capacity(count)).collect();
     let mut last: Option<UnitQuaternion<f64>> = None;
     for k in 0..count {
-        let x: Vec<f64> = (0..m).map(|c| run.motion.q[c * count + k]).collect();
-        let Some(pose) = mechanism.task.motion(&x, &zero, &zero) else {
+        let x: Vec<f64> = (0..m).map(|c| motion.q[c * count + k]).collect();
+        let Some(pose) = mechanism.platform().task.motion(&x, &zero, &zero) else {
             return Err(Error::Argument(format!(
                 "--pose: {} has joints, not a platform, as its coordinates",
                 plant.name()

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! Numbers are written with the fewest digits that read back as the same number, so a round trip
-//! is exact. `kind` says what the series move: `fourier` the joints. Unknown keys are ignored.
+//! is exact. `coordinates` says what the series of a parallel robot move, its `"platform"` or its
+//! `"actuators"`; without it they move the robot's own coordinates. Unknown keys are ignored.
 
 use super::basis::Ends;
 use super::fourier::{Fourier, Series};
@@ -24,14 +25,24 @@ pub const FORMAT: &str = "excite-trajectory";
 /// Newest `version` known.
 pub const VERSION: u32 = 1;
 
-/// What the series of a trajectory move.
+/// What describes the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Kind {
-    /// the joint coordinates
+    /// a Fourier series for each coordinate
     #[default]
     Fourier,
+}
+
+/// Coordinates in which a parallel robot moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Space {
+    /// pose of the platform
+    Platform,
+    /// positions of the actuators
+    Actuators,
 }
 
 /// A designed trajectory, as stored in `trajectory.json`.
@@ -43,8 +54,10 @@ pub struct Trajectory {
     pub robot_hash: String,
     /// names of the joints, in order
     pub joints: Vec<String>,
-    /// what the series move
+    /// what describes the motion
     pub kind: Kind,
+    /// what the series move; `None`: the robot's own coordinates
+    pub space: Option<Space>,
     /// the motion
     pub fourier: Fourier,
     /// how many periods to run
@@ -70,6 +83,12 @@ struct Document {
     robot_hash: String,
     joints: Vec<String>,
     kind: Kind,
+    #[serde(
+        default,
+        rename = "coordinates",
+        skip_serializing_if = "Option::is_none"
+    )]
+    space: Option<Space>,
     period: f64,
     periods: u32,
     harmonics: Vec<u32>,
@@ -96,6 +115,7 @@ impl Trajectory {
             robot_hash: robot.hash.clone(),
             joints: robot.joint_names(),
             kind: Kind::Fourier,
+            space: None,
             fourier,
             periods: 1,
             ends: Ends::Free,
@@ -204,6 +224,7 @@ impl Trajectory {
             robot_hash: self.robot_hash.clone(),
             joints: self.joints.clone(),
             kind: self.kind,
+            space: self.space,
             period: self.fourier.period,
             periods: self.periods,
             harmonics: self.fourier.harmonics.clone(),
@@ -294,6 +315,7 @@ impl Document {
             robot_hash: self.robot_hash,
             joints: self.joints,
             kind: self.kind,
+            space: self.space,
             fourier,
             periods: self.periods,
             ends: self.ends,
@@ -316,6 +338,7 @@ mod tests {
             robot_hash: "ab12".into(),
             joints: vec!["a".into(), "b".into()],
             kind: Kind::Fourier,
+            space: Some(Space::Actuators),
             fourier: Fourier {
                 period: 0.1 + 0.2,
                 harmonics: vec![1, 3],

@@ -23,7 +23,7 @@ pub use basis::{Basis, Ends};
 pub use certificate::{Certificate, certify};
 pub use extrema::{Extrema, Extremum, extrema};
 pub use extrema_fast::extrema_fast;
-pub use file::Trajectory;
+pub use file::{Space, Trajectory};
 pub use fourier::{Fourier, Series};
 pub use grid::Grid;
 pub use samples::Samples;

@@ -4,6 +4,7 @@ use super::reproduce::seed;
 use super::verdict::{verdict, violations};
 use crate::design::record::Record;
 use crate::identifiability::{Assessment, Excitation, Platform};
+use crate::trajectory::Space;
 use crate::trajectory::certificate::{JointCertificate, Peak};
 use serde_json::{Map, Value, json};
 
@@ -210,9 +211,11 @@ fn platform(p: &Platform) -> Value {
 
 fn trajectory(e: &Excitation) -> Value {
     let t = &e.trajectory;
+    let space = e.platform.as_ref().map_or(Space::Actuators, |p| p.space);
     json!({
         "period": number(t.fourier.period),
         "periods": t.periods,
+        "coordinates": space,
         "harmonics": t.fourier.harmonics,
         "grid": t.grid.name(),
         "ends": t.ends.name(),

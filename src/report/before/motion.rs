@@ -6,6 +6,7 @@ use super::super::plot::{self, Axis, Bar, Colour, Marker, Panel, Series, Shape};
 use super::verdict::violations;
 use crate::identifiability::{Excitation, Platform, RATE};
 use crate::robot::{Motion, Robot};
+use crate::trajectory::Space;
 use crate::trajectory::certificate::{Kind, Peak};
 use maud::{Markup, html};
 
@@ -83,8 +84,16 @@ pub(super) fn curves(robot: &Robot, e: &Excitation) -> Section {
 
 /// What is proven of a closed chain, and what is stated.
 fn closed(p: &Platform) -> &'static str {
-    match p.certificate.proven {
-        true => {
+    match (p.space, p.certificate.proven) {
+        (Space::Actuators, true) => {
+            "These are the actuators, whose positions are the Fourier series: extrema of position, \
+             velocity, acceleration and jerk are those of the series itself, found as roots of its \
+             derivative. Forces are those of the nominal model at 4000 instants; between two of \
+             them they are bounded by twice the largest second difference, which is stated, not \
+             proven. Coulomb friction counts with the sign that makes the force larger. Collisions \
+             other than of legs are not looked at."
+        }
+        (Space::Platform, true) => {
             "These are the actuators. Their positions, velocities, accelerations and jerks hold at \
              all times: they are enclosed over every stretch of time by interval arithmetic on the \
              kinematics. Forces are those of the nominal model at 4000 instants; between two of \
@@ -92,7 +101,7 @@ fn closed(p: &Platform) -> &'static str {
              proven. Coulomb friction counts with the sign that makes the force larger. Collisions \
              other than of legs are not looked at."
         }
-        false => {
+        (_, false) => {
             "These are the actuators, at 4000 instants. Between two of them everything is bounded \
              by twice the largest second difference: this mechanism has no closed-form kinematics, \
              so that bound is stated, not proven. Coulomb friction counts with the sign that makes \

@@ -4,6 +4,7 @@ use super::super::html::Section;
 use crate::design::record::Record;
 use crate::design::settings::Settings;
 use crate::identifiability::Assessment;
+use crate::trajectory::Space;
 use maud::html;
 
 /// Command, settings, seed, hash and version.
@@ -15,7 +16,7 @@ pub(super) fn section(a: &Assessment, record: Option<&Record>) -> Section {
         .map_or(robot.name.clone(), |p| p.display().to_string());
     let trajectory = a.excitation.as_ref().map(|e| &e.trajectory);
     let command = match (record, trajectory) {
-        (Some(r), _) => design(&file, &r.settings),
+        (Some(r), t) => design(&file, t.and_then(|t| t.space), &r.settings),
         (None, Some(_)) => format!("excite identifiability {} trajectory.json", quoted(&file)),
         (None, None) => format!("excite identifiability {}", quoted(&file)),
     };
@@ -74,8 +75,11 @@ pub(super) fn seed(a: &Assessment, record: Option<&Record>) -> Option<u64> {
 }
 
 /// The command of a design, every setting spelt out.
-fn design(file: &str, s: &Settings) -> String {
+fn design(file: &str, space: Option<Space>, s: &Settings) -> String {
     let mut parts = vec![format!("excite design {}", quoted(file))];
+    if let Some(space) = space {
+        parts.push(format!("--coordinates {}", word(space)));
+    }
     parts.push(format!("--harmonics {}", s.harmonics));
     parts.push(format!("--period {}", s.period));
     parts.push(format!("--periods {}", s.periods));
@@ -122,9 +126,14 @@ mod tests {
 
     #[test]
     fn the_command_spells_out_every_setting_and_quotes_the_file() {
-        let command = design("my robot's.toml", &Settings::default());
+        let command = design(
+            "my robot's.toml",
+            Some(Space::Actuators),
+            &Settings::default(),
+        );
         assert!(command.starts_with("excite design 'my robot'\\''s.toml'"));
         for part in [
+            "--coordinates actuators",
             "--harmonics 5",
             "--period 10",
             "--grid full",
