@@ -136,9 +136,11 @@ impl<'a> Data<'a> {
         let mut w: Vec<Mat<f64>> = (0..n).map(|_| Mat::zeros(rows, p)).collect();
         let mut known = vec![vec![0.0; rows]; n];
         let mut tau = vec![vec![0.0; rows]; n];
-        for (k, r) in records.iter().enumerate() {
-            let y = plant.regressor(&r.x)?;
-            let rest = plant.known_torque(&r.x)?;
+        let models: Vec<_> = records
+            .par_iter()
+            .map(|r| Ok((plant.regressor(&r.x)?, plant.known_torque(&r.x)?)))
+            .collect::<Result<_>>()?;
+        for (k, (r, (y, rest))) in records.iter().zip(models).enumerate() {
             for j in 0..n {
                 let at = j * r.count;
                 tau[j][start[k]..start[k + 1]].copy_from_slice(r.torque(j));
@@ -480,29 +482,28 @@ impl<'a> Data<'a> {
             .collect()
     }
 
-    /// Adds a column that every model may use within a prior: an ordinary imperfection.
-    pub fn add_nuisance(&mut self, name: &str, column: &Column, spread: f64) {
-        for j in 0..self.joints() {
-            let (rows, p) = (self.w[j].nrows(), self.w[j].ncols());
-            let values = column.get(j);
-            let old = std::mem::replace(&mut self.w[j], Mat::zeros(0, 0));
-            self.w[j] = Mat::from_fn(rows, p + 1, |i, c| match (c == p, values) {
-                (true, Some(v)) => v[i],
-                (true, None) => 0.0,
-                _ => old[(i, c)],
+    /// Adds columns that every model may use within a prior: ordinary imperfections, each with its name
+    /// and its standard deviation.
+    fn add_nuisances(&mut self, all: &[(&str, Column, f64)]) {
+        self.w.par_iter_mut().enumerate().for_each(|(j, w)| {
+            let (rows, p) = (w.nrows(), w.ncols());
+            w.resize_with(rows, p + all.len(), |i, c| {
+                all[c - p].1.get(j).map_or(0.0, |values| values[i])
             });
-        }
-        self.parameters.push(Parameter {
-            name: name.to_string(),
-            unit: "",
-            value: 0.0,
-            // no joint of the robot: not an unknown of the nominal model
-            kind: Kind::Term {
-                joint: usize::MAX,
-                term: JointTerm::Offset,
-            },
         });
-        self.spread.push(spread);
+        for (name, _, spread) in all {
+            self.parameters.push(Parameter {
+                name: (*name).to_string(),
+                unit: "",
+                value: 0.0,
+                // no joint of the robot: not an unknown of the nominal model
+                kind: Kind::Term {
+                    joint: usize::MAX,
+                    term: JointTerm::Offset,
+                },
+            });
+            self.spread.push(*spread);
+        }
     }
 
     /// What a log of any robot may have without being at odds with its model: reversals of friction
@@ -512,6 +513,7 @@ impl<'a> Data<'a> {
         if self.plant.mechanism().is_some_and(redundant) {
             return;
         }
+        let mut nuisances = Vec::new();
         for (j, actuator) in self.plant.actuators().into_iter().enumerate() {
             let coulomb = actuator.terms[2].abs();
             if coulomb == 0.0 {
@@ -525,9 +527,10 @@ impl<'a> Data<'a> {
             // tanh of three widths: any rounding in between is close to a sum of them
             for wide in ROUNDED.map(|w| w * self.speed[j]) {
                 let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
-                self.add_nuisance("reversal", &Column::on(j, column), 0.5 * coulomb);
+                nuisances.push(("reversal", Column::on(j, column), 0.5 * coulomb));
             }
         }
+        self.add_nuisances(&nuisances);
     }
 
     /// Weights of the rows of an actuator of a closed chain: 0 where it may stick and up to [`BLUR`]

@@ -170,7 +170,7 @@ impl<'a> Evidence<'a> {
             })
             .collect();
         let grams: Vec<Mat<f64>> = w
-            .iter()
+            .par_iter()
             .map(|w| {
                 let f = w.subrows(0, fitted);
                 f.transpose() * f

@@ -45,6 +45,7 @@ use catalogue::{Context, Value};
 use data::Data;
 use evidence::{Evidence, Projected};
 use gap::{JointGap, Shares};
+use rayon::prelude::*;
 use record::{Raw, Record};
 
 /// What a diagnosis is asked for.
@@ -276,7 +277,7 @@ pub fn prepare<'a>(plant: &'a Plant, raws: &[Raw]) -> Result<Data<'a>> {
     }
     let likely: Vec<f64> = raws.iter().filter_map(|r| r.period).collect();
     let records = raws
-        .iter()
+        .par_iter()
         .map(|r| Record::prepare(plant, r, &likely))
         .collect::<Result<Vec<_>>>()?;
     let mut data = Data::new(plant, records)?;

@@ -1,6 +1,7 @@
 //! Search over effects, places and shapes.
 
 use super::catalogue::{Context, Effect};
+use super::data::Column;
 use super::evidence::{Evidence, Fit, Projected};
 use rayon::prelude::*;
 
@@ -74,18 +75,15 @@ pub fn best_shape(
     before: &Fit,
 ) -> Option<Candidate> {
     let effect = effects[which].as_ref();
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for shapes in effect.shapes(cx, place).chunks(8) {
-        let sets: Vec<_> = shapes
-            .iter()
-            .map(|s| effect.columns(cx, place, s, true))
-            .collect();
-        if sets
-            .iter()
-            .any(|s| s.is_empty() || s.iter().any(|c| c.rows.is_empty()))
-        {
-            continue;
+    let grid = effect.shapes(cx, place);
+    let best_of = |shapes: &[Vec<f64>]| -> Option<(f64, Vec<f64>)> {
+        let columns = |s: &Vec<f64>| effect.columns(cx, place, s, true);
+        let sets: Vec<_> = shapes.iter().map(columns).collect();
+        let empty = |s: &Vec<Column>| s.is_empty() || s.iter().any(|c| c.rows.is_empty());
+        if sets.iter().any(empty) {
+            return None;
         }
+        let mut best: Option<(f64, Vec<f64>)> = None;
         for (projected, shape) in evidence.project_all(&sets).iter().zip(shapes) {
             let mut set = beside.to_vec();
             set.push(projected);
@@ -99,12 +97,15 @@ pub fn best_shape(
                 best = Some((gain, shape.clone()));
             }
         }
-    }
+        best
+    };
+    let parts: Vec<_> = grid.par_chunks(8).with_max_len(1).map(best_of).collect();
+    let better = |a: (f64, Vec<f64>), b: (f64, Vec<f64>)| if b.0 > a.0 { b } else { a };
+    let best = parts.into_iter().flatten().reduce(better);
     let (gain, mut shape) = best?;
     // between grid points
     if gain > 20.0 {
         let mut top = gain;
-        let grid = effect.shapes(cx, place);
         let bounds: Vec<[f64; 2]> = (0..shape.len())
             .map(|k| {
                 let ends = grid

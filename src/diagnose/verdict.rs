@@ -414,6 +414,8 @@ pub fn decide(
     let hold_after = st.gap(&residual, false);
     let surprise_after = st.surprise(&fit, &residual);
     let mut members: Vec<Member> = (0..set.len())
+        .into_par_iter()
+        .with_max_len(1)
         .map(|i| judge(&st, list, &set, i, &after, surprise_after, total))
         .collect();
     // coefficients of the common fit
