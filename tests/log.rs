@@ -240,6 +240,13 @@ fn a_recording_cut_in_its_last_line_is_read() {
     let r = read(&path).unwrap();
     says(&r, &["breaks off"]);
     assert_eq!(r.len(), 500);
+    // a bad line before it is no end of the recording
+    let text = std::fs::read_to_string(&path).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[300] = "1.0,abc";
+    std::fs::write(&path, lines.join("\n")).unwrap();
+    let e = read(&path).unwrap_err().to_string();
+    assert!(e.contains("line 301") && e.contains("abc"), "{e}");
 }
 
 #[test]

@@ -31,6 +31,8 @@ pub struct Table {
 /// What is wrong with a line: its number within the piece, and why.
 struct Bad {
     line: usize,
+    /// whether the text ends in it
+    last: bool,
     message: String,
 }
 
@@ -139,7 +141,7 @@ impl Table {
             if let Some(bad) = p.bad {
                 let at = *line + bad.line;
                 // a recording that was cut in the middle of its last line
-                if cut_off && k == last && bad.line == p.lines {
+                if cut_off && k == last && bad.last {
                     self.warnings.push(Warning::new(
                         path.display().to_string(),
                         format!("line {at} breaks off at the end of the file; it was left out"),
@@ -249,6 +251,15 @@ fn piece(text: &[u8], keep: &[bool]) -> Piece {
     for (column, keep) in out.columns.iter_mut().zip(keep) {
         column.reserve(if *keep { rows } else { 0 });
     }
+    let bad = |line: usize, at: usize, message: String| {
+        let rest = text.get(at.saturating_sub(1)..).unwrap_or_default();
+        let last = !rest.contains(&b'\n');
+        Some(Bad {
+            line,
+            last,
+            message,
+        })
+    };
     let mut row = vec![0.0; n];
     let mut at = 0;
     while at < text.len() {
@@ -278,10 +289,8 @@ fn piece(text: &[u8], keep: &[bool]) -> Piece {
                     None => {
                         let shown: String =
                             String::from_utf8_lossy(cell).chars().take(40).collect();
-                        out.bad = Some(Bad {
-                            line: out.lines,
-                            message: format!("column {{{k}}}: `{shown}` is not a number"),
-                        });
+                        let message = format!("column {{{k}}}: `{shown}` is not a number");
+                        out.bad = bad(out.lines, at, message);
                         return out;
                     }
                 }
@@ -292,10 +301,8 @@ fn piece(text: &[u8], keep: &[bool]) -> Piece {
             }
         }
         if k != n {
-            out.bad = Some(Bad {
-                line: out.lines,
-                message: format!("it has {k} cells and the header {n} names"),
-            });
+            let message = format!("it has {k} cells and the header {n} names");
+            out.bad = bad(out.lines, at, message);
             return out;
         }
         for k in 0..n {
