@@ -194,17 +194,6 @@ fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
 }
 
 #[test]
-fn what_the_records_of_an_h4_cannot_show_is_shown() {
-    let effect = Some((Field::LoadFriction, "motor1=0.1"));
-    let mut case = Case::new("h4", effect, 1.0, 0.2, None);
-    let (before, n) = case.propose();
-    assert_eq!(n.separates, ["payload", NOMINAL]);
-    let hidden = |d: &Diagnosis| d.untestable.iter().any(|u| u.0 == "payload");
-    assert!(hidden(&before));
-    assert!(!hidden(&case.rehearsed(&n)));
-}
-
-#[test]
 fn what_the_records_of_an_arm_cannot_show_is_shown() {
     let mut case = Case::new("ur5e", None, 1.0, 1.0, Some(1));
     let (before, n) = case.propose();

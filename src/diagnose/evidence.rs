@@ -46,16 +46,20 @@ impl Projected {
         (quad(&self.s), quad(&self.raw))
     }
 
-    /// Share of the effect that the nominal model cannot absorb; with unknown coefficients that of all
-    /// columns together.
-    pub fn visibility(&self, eta: Option<&[f64]>) -> f64 {
-        let (left, all) = match eta {
+    /// The same; with unknown coefficients of all columns together, per unit of each.
+    pub fn energies(&self, eta: Option<&[f64]>) -> (f64, f64) {
+        match eta {
             Some(eta) => self.energy(eta),
             None => {
                 let sum = |m: &Mat<f64>| (0..self.z.len()).map(|i| m[(i, i)]).sum::<f64>();
                 (sum(&self.s), sum(&self.raw))
             }
-        };
+        }
+    }
+
+    /// Share of the effect that the nominal model cannot absorb.
+    pub fn visibility(&self, eta: Option<&[f64]>) -> f64 {
+        let (left, all) = self.energies(eta);
         (left / all.max(1e-300)).clamp(0.0, 1.0)
     }
 }

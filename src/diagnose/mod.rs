@@ -404,7 +404,7 @@ pub fn of_logs(
             interval,
             holdout: m.holdout,
             visibility: m.visibility,
-            decoys: Some(m.decoys),
+            decoys: m.decoys,
             values: effect.values(&cx, &c.place, &c.shape, &c.eta, &m.std),
             same,
             member: true,

@@ -74,7 +74,7 @@ pub fn propose(
 ) -> Option<Proposal> {
     let mut targets = pairs(effects, findings);
     let first_hidden = targets.len();
-    targets.extend(hidden(effects, list, findings));
+    targets.extend(hidden(evidence, cx, effects, list, findings));
     let mut now: Vec<f64> = targets
         .par_iter()
         .with_max_len(1)
@@ -165,14 +165,20 @@ fn pairs<'a>(effects: &'a [Box<dyn Effect>], findings: &'a [Finding]) -> Vec<Tar
 /// Effects that the nominal model absorbs: members that show in nothing but its parameters, then those
 /// of the catalogue at the place where they come nearest to the gap.
 fn hidden<'a>(
+    evidence: &Evidence,
+    cx: &Context,
     effects: &'a [Box<dyn Effect>],
     list: &'a [Candidate],
     findings: &'a [Finding],
 ) -> Vec<Target<'a>> {
+    let shown = |placed: Placed<'a>| {
+        let seen = placed.visible(evidence, cx)?;
+        Some(Target::Hidden(placed, seen))
+    };
     let invisible = |f: &&Finding| f.member && f.visibility < INVISIBLE;
     let members = findings.iter().filter(invisible);
     let mut all: Vec<Target> = members
-        .filter_map(|f| Some(Target::Hidden(Placed::of_finding(effects, f)?)))
+        .filter_map(|f| shown(Placed::of_finding(effects, f)?))
         .collect();
     if !all.is_empty() {
         return all;
@@ -182,7 +188,7 @@ fn hidden<'a>(
         let absorbed = c.projected.visibility(None) < INVISIBLE;
         if absorbed && !known.contains(&c.effect) && all.len() < HIDDEN {
             known.push(c.effect);
-            all.push(Target::Hidden(Placed::of_candidate(effects, c)));
+            all.extend(shown(Placed::of_candidate(effects, c)));
         }
     }
     all
@@ -228,7 +234,7 @@ fn improved(
 fn names(target: &Target) -> Vec<&'static str> {
     match target {
         Target::Pair(a, b) => vec![a.effect.card().name, b.effect.card().name],
-        Target::Hidden(a) => vec![a.effect.card().name, NOMINAL],
+        Target::Hidden(a, _) => vec![a.effect.card().name, NOMINAL],
     }
 }
 
@@ -244,7 +250,7 @@ fn why(target: &Target, also: &[&Target], overlap: [f64; 2], data: &super::Data)
                  could imitate {then:.0} % of it instead of {now:.0} %"
             )
         }
-        Target::Hidden(a) => {
+        Target::Hidden(a, _) => {
             let a = a.words(&joints);
             format!(
                 "{a} cannot be seen in the records at hand, where other parameters of the nominal model imitate \
@@ -255,7 +261,7 @@ fn why(target: &Target, also: &[&Target], overlap: [f64; 2], data: &super::Data)
     let others: Vec<String> = also
         .iter()
         .map(|t| match t {
-            Target::Pair(a, _) | Target::Hidden(a) => a.words(&joints),
+            Target::Pair(a, _) | Target::Hidden(a, _) => a.words(&joints),
         })
         .collect();
     if !others.is_empty() {

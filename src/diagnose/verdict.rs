@@ -50,8 +50,9 @@ pub struct Member {
     pub holdout: f64,
     /// share of the effect's energy that the nominal model cannot absorb
     pub visibility: f64,
-    /// the most that a decoy gains of its own, over what the effect gains
-    pub decoys: f64,
+    /// the most that a decoy gains of its own, over what the effect gains; not of an effect that shows in
+    /// parameters alone
+    pub decoys: Option<f64>,
     /// rivals by falling weight
     pub rivals: Vec<Rival>,
     /// standard deviations of the coefficients
@@ -109,6 +110,9 @@ const LEAST_SHARE: f64 = 0.05;
 const LEAST_OF_ALL: f64 = 0.012;
 /// Gap per row of a joint, in noise variances, in which an effect can be found at all.
 const LEAST_GAP: f64 = 0.15;
+/// The same on its own joints for an effect that rings with damping: what friction at reversals starts in the loop of
+/// the controller, and positions do not resolve, rings too.
+const LEAST_RINGING: f64 = 0.35;
 /// Fall of the residual on holdout records over the fall that the fit predicts, at least.
 const HELD: f64 = 0.5;
 /// What a decoy may gain beyond what it shares with the effect, over what the effect gains.
@@ -688,21 +692,30 @@ fn judge(
             };
             let seen = (over(&without) - over(after)) / over(&without).max(1e-9);
             let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+            let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
+            let ringing = match effect.rings(&c.shape) {
+                true => logistic((own - LEAST_RINGING) / 0.04),
+                false => 1.0,
+            };
             logistic((seen - LEAST_SHARE) / 0.01)
                 * logistic((explains - LEAST_OF_ALL) / 0.003)
                 * logistic((there - LEAST_GAP) / 0.02)
+                * ringing
         }
     };
     let predicted = match frozen || effect.remembers() {
         true => 1.0,
         false => predicts(data, &r0, &r1),
     };
-    let columns = effect.columns(st.cx, &c.place, &c.shape, false);
-    let decoys = decoy::largest(st.evidence, &columns, &c.eta, &beside);
+    // what shows in parameters alone is no signal that could be moved
+    let decoys = (!frozen).then(|| {
+        let columns = effect.columns(st.cx, &c.place, &c.shape, false);
+        decoy::largest(st.evidence, &columns, &c.eta, &beside)
+    });
     let together = size
         * matters
         * logistic((predicted - HELD) / 0.05)
-        * logistic((DECOY - decoys) / 0.03)
+        * decoys.map_or(1.0, |d| logistic((DECOY - d) / 0.03))
         * logistic((share - 0.55) / 0.07).max(alone)
         * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07));
     Member {

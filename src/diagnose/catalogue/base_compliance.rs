@@ -36,6 +36,10 @@ impl Effect for BaseCompliance {
         k == 0
     }
 
+    fn rings(&self, _shape: &[f64]) -> bool {
+        true
+    }
+
     fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
         let Some(load) = cx.base() else {
             return Vec::new();

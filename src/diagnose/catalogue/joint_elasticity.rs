@@ -41,6 +41,10 @@ impl Effect for JointElasticity {
         k < 2
     }
 
+    fn rings(&self, shape: &[f64]) -> bool {
+        shape[1] > 0.08
+    }
+
     fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column> {
         let j = place[0];
         let spring = |r: &Record, k: usize| {

@@ -109,6 +109,10 @@ pub trait Effect: Sync {
     fn hides(&self) -> bool {
         false
     }
+    /// Whether it rings with damping, as the loop of the robot's controller does.
+    fn rings(&self, _shape: &[f64]) -> bool {
+        false
+    }
     /// Whether it depends on what went on before a record began, so that coefficients of one record
     /// need not fit another.
     fn remembers(&self) -> bool {

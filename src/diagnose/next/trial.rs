@@ -72,6 +72,13 @@ impl<'a> Placed<'a> {
         (!columns.is_empty()).then(|| evidence.project(&columns))
     }
 
+    /// Energy per row, in noise variances, that the nominal model cannot absorb: of the fitted
+    /// coefficients, or per unit of each.
+    pub fn visible(&self, evidence: &Evidence, cx: &Context) -> Option<f64> {
+        let projected = self.projected(evidence, cx)?;
+        Some(projected.energies(self.eta).0 / evidence.data.fitted.max(1) as f64)
+    }
+
     /// With the fitted shape and others of its grid, in all no more than `most`.
     fn shapes(&self, evidence: &Evidence, cx: &Context, most: usize) -> Vec<Projected> {
         let grid = self.effect.shapes(cx, self.place);
@@ -91,14 +98,14 @@ impl<'a> Placed<'a> {
 pub(super) enum Target<'a> {
     /// an effect and its rival
     Pair(Placed<'a>, Placed<'a>),
-    /// an effect and the nominal model
-    Hidden(Placed<'a>),
+    /// an effect and the nominal model, and the energy per row that is visible in the records at hand
+    Hidden(Placed<'a>, f64),
 }
 
 impl Target<'_> {
     /// Share of the effect that its rival, or the nominal model, can imitate. A rival has whichever of
     /// `shapes` shapes imitates most; an effect of unknown size the one that shows best. `None` where the
-    /// effect is not there, or is lost in the noise.
+    /// effect is not there, is lost in the noise, or shows less than it has to.
     pub fn overlap(&self, evidence: &Evidence, cx: &Context, shapes: usize) -> Option<f64> {
         match self {
             Target::Pair(a, b) => {
@@ -112,7 +119,11 @@ impl Target<'_> {
                 let each = rivals.iter().map(|b| evidence.overlap(&a, eta, b));
                 each.reduce(f64::max)
             }
-            Target::Hidden(a) => {
+            Target::Hidden(a, least) => {
+                // a slow motion shows a large share of next to nothing
+                if a.visible(evidence, cx)? < *least {
+                    return None;
+                }
                 let seen = match a.eta {
                     Some(eta) => Some(a.projected(evidence, cx)?.visibility(Some(eta))),
                     None => {
