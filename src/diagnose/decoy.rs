@@ -44,8 +44,8 @@ fn moved(data: &Data, column: &Column, share: f64) -> Column {
     }
 }
 
-/// The most that a decoy of an effect with these columns and coefficients gains of its own, over what
-/// the effect gains beside the others:
+/// The most that a decoy of an effect, its columns as they are and projected, with these coefficients
+/// gains of its own, over `own`, what the effect gains beside the others:
 ///
 /// ```text
 /// max over d:  gain_d / gain − overlap_d
@@ -53,21 +53,25 @@ fn moved(data: &Data, column: &Column, share: f64) -> Column {
 ///
 /// A slow column resembles itself when it is moved; what its decoy takes for that reason, the overlap, is
 /// no evidence against it. Near 0 for an effect that is there, 1 and more for one that is as good as any.
-pub fn largest(evidence: &Evidence, columns: &[Column], eta: &[f64], beside: &[&Projected]) -> f64 {
+pub fn largest(
+    evidence: &Evidence,
+    (columns, projected): (&[Column], &Projected),
+    eta: &[f64],
+    beside: &[&Projected],
+    own: f64,
+) -> f64 {
     let of = |share| -> Vec<Column> {
         let of = |c| moved(evidence.data, c, share);
         columns.iter().map(of).collect()
     };
-    let own = evidence.project(columns);
     let before = evidence.fit(beside).gain;
-    let gain = |effect: &Projected| {
+    let gain = |decoy: &Projected| {
         let mut set = beside.to_vec();
-        set.push(effect);
+        set.push(decoy);
         evidence.fit(&set).gain - before
     };
-    let least = gain(&own).max(1e-9);
     let sets: Vec<Vec<Column>> = shifts().map(of).collect();
     let decoys = evidence.project_all(&sets);
-    let excess = |d: &Projected| gain(d) / least - evidence.overlap(&own, eta, d);
+    let excess = |d: &Projected| gain(d) / own.max(1e-9) - evidence.overlap(projected, eta, d);
     decoys.iter().map(excess).fold(0.0, f64::max)
 }

@@ -657,12 +657,6 @@ fn judge(
         true => (kept(&r0) - kept(&r1)) / held as f64 / (chi_gain / rows).max(1e-9),
         false => 1.0,
     };
-    let quad = |m: &faer::Mat<f64>| -> f64 {
-        let e = &c.eta;
-        (0..e.len())
-            .map(|x| (0..e.len()).map(|y| e[x] * m[(x, y)] * e[y]).sum::<f64>())
-            .sum()
-    };
     let all_without = st.above(&without, true);
     let all_after = st.above(after, true);
     // an effect that hides in the parameters: what the frozen model lacks
@@ -710,7 +704,7 @@ fn judge(
     // what shows in parameters alone is no signal that could be moved
     let decoys = (!frozen).then(|| {
         let columns = effect.columns(st.cx, &c.place, &c.shape, false);
-        decoy::largest(st.evidence, &columns, &c.eta, &beside)
+        decoy::largest(st.evidence, (&columns, &c.projected), &c.eta, &beside, gain)
     });
     let together = size
         * matters
@@ -724,7 +718,7 @@ fn judge(
         together,
         explains: explains.clamp(0.0, 1.0),
         holdout: holdout.clamp(-1.0, 1.0),
-        visibility: (quad(&c.projected.s) / quad(&c.projected.raw).max(1e-300)).clamp(0.0, 1.0),
+        visibility: c.projected.visibility(Some(&c.eta)),
         decoys,
         rivals,
         std: Vec::new(),
