@@ -94,6 +94,7 @@ fn log(
         t: (0..count).map(|i| i as f64 / RATE).collect(),
         q: vec![Vec::new(); 2],
         tau: vec![Vec::new(); 2],
+        qref: None,
     };
     for (i, (q, v)) in states.iter().enumerate() {
         for j in 0..2 {

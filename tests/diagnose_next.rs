@@ -90,6 +90,7 @@ impl Case {
                 q: columns(&seen.q),
                 tau: columns(&seen.tau),
                 t: run.t,
+                qref: None,
             }
         };
         self.runs.iter().map(one).collect()

@@ -87,6 +87,7 @@ impl Rehearsal {
                 q: columns(&seen.q),
                 tau: columns(&seen.tau),
                 t: run.t,
+                qref: None,
             }
         };
         speeds.map(one).into()

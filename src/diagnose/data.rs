@@ -3,6 +3,7 @@
 // several arrays share the index of an actuator
 #![allow(clippy::needless_range_loop)]
 
+use super::closeness::{Closeness, factors};
 use super::noise::{LINES, Noise, between_periods, spectrum};
 use super::record::Record;
 use crate::dynamics::Samples;
@@ -66,6 +67,8 @@ pub struct Data<'a> {
     pub parameters: Vec<Parameter>,
     /// their standard deviations a priori
     pub spread: Vec<f64>,
+    /// factors on them that were estimated
+    pub closeness: Closeness,
     /// regressor by actuator, rows of all records × parameters
     pub w: Vec<Mat<f64>>,
     /// torque that no parameter stands for, by actuator
@@ -180,6 +183,7 @@ impl<'a> Data<'a> {
             start,
             fitted,
             spread: Vec::new(),
+            closeness: [1.0; 2],
             parameters,
             w,
             known,
@@ -480,6 +484,16 @@ impl<'a> Data<'a> {
                 }
             })
             .collect()
+    }
+
+    /// Scales the prior by what the records say of how close the model is.
+    pub fn tighten(&mut self, closeness: Closeness) {
+        let factors = factors(self, closeness);
+        self.spread
+            .iter_mut()
+            .zip(factors)
+            .for_each(|(s, f)| *s *= f);
+        self.closeness = closeness;
     }
 
     /// Adds columns that every model may use within a prior: ordinary imperfections, each with its name

@@ -232,6 +232,19 @@ impl<'a> Evidence<'a> {
         }
     }
 
+    /// `WᵀW` and `Wᵀr` over fitted rows, in units of the prior.
+    pub fn normal_equations(&self) -> [Mat<f64>; 2] {
+        let gram = &self.l * self.l.transpose() - Mat::<f64>::identity(self.d.len(), self.d.len());
+        [gram, &self.l * faer::ColRef::from_slice(&self.d).as_mat()]
+    }
+
+    /// `WᵀZ` in units of the prior, `ZᵀZ` and `Zᵀr` over fitted rows.
+    pub fn as_seen(&self, a: &Projected) -> [Mat<f64>; 3] {
+        let absorbed = a.c.transpose() * faer::ColRef::from_slice(&self.d).as_mat();
+        let with = Mat::from_fn(a.b.len(), 1, |i, _| a.b[i] + absorbed[(i, 0)]);
+        [&self.l * &a.c, a.raw.clone(), with]
+    }
+
     /// Whitens and reduces columns.
     pub fn project(&self, columns: &[Column]) -> Projected {
         self.project_all(std::slice::from_ref(&columns.to_vec()))

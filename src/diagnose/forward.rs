@@ -1,23 +1,29 @@
 //! What a user of the simulator sees: the robot simulated under the torques of a log, with the
 //! nominal model, with the refitted one and with the effects found.
 //!
-//! Driven by the recorded torque alone every model drifts away, so a soft spring and damper of
-//! natural frequency `ω` ([`BANDWIDTH`]) and ratio 1 hold the simulated robot to the recorded motion
+//! Where the log holds commanded positions, the simulated robot is under the **same commands**: its
+//! controller sends what was recorded, less the feedback of the deviation ([`controller`](super::controller)).
+//! Otherwise the recorded torque drives it; as every model drifts away on torque alone, a soft spring
+//! and damper of natural frequency `ω` ([`BANDWIDTH`]) and ratio 1 hold it to the recorded motion
 //! `x_m`. With the deviation `e = x − x_m`, friction `λ` and the torque `τ_e` of the effects:
 //!
 //! ```text
-//! M (ẍ_m + ë) + h + Dᵀ (F_v q̇ + o + λ) = D_aᵀ (τ − τ_e) − M (ω² e + 2 ω ė)      |λ_j| ≤ F_c,j
+//! M (ẍ_m + ë) + h + Dᵀ (F_v q̇ + o + λ) = D_aᵀ (τ − τ_e) − K_p e − K_d ė − K_i ∫e      |λ_j| ≤ F_c,j
+//! feedback of actuators        K_x = D_aᵀ diag(k_x) D_a
+//! … of inverse dynamics        K_x = k_x M̂
+//! soft spring                  K_p = ω² M,  K_d = 2 ω M,  K_i = 0
 //! ```
 //!
 //! all of it at `x_m + e`. A model that is right stays on the recorded motion; a torque `r` that it
-//! lacks moves it by about `r / (M ω²)` where it changes slower than `ω`, by less where it changes
-//! faster. The step is implicit in the velocity (Moreau 1988), one a sample; dry
-//! friction is set-valued, from the same quadratic program as in [`simulate`](crate::simulate).
+//! lacks moves it by about `K_p⁻¹ r` where it changes slowly, by less where it changes fast. The step is
+//! implicit in the velocity (Moreau 1988), one a sample; dry friction is set-valued, from the same
+//! quadratic program as in [`simulate`](crate::simulate).
 //!
 //! Effects act as the torque that their columns give along the recorded motion, not along the
 //! simulated one. Torque noise is not taken off.
 
 use super::catalogue::{Context, Effect};
+use super::controller::{Feedback, Kind as Acts};
 use super::data::Data;
 use super::record::Record;
 use super::verdict::Member;
@@ -26,6 +32,7 @@ use crate::estimate::robot::with_values;
 use crate::report::format::unit_of;
 use crate::robot::Robot;
 use crate::simulate::Dynamics;
+use crate::simulate::control::actuation;
 use crate::simulate::friction::hold;
 use crate::trajectory::certificate::Kind;
 use nalgebra::{DMatrix, DVector};
@@ -49,6 +56,8 @@ pub struct Simulated {
     /// rms of the deviation from the log by actuator, rad or m; `None` for a model that cannot be
     /// simulated
     pub rms: [Option<Vec<f64>>; 3],
+    /// rms of the torque by which the controller answers the deviation, by actuator, N m or N
+    pub torque: [Option<Vec<f64>>; 3],
     /// times, s
     pub t: Vec<f64>,
     /// deviation by actuator, rad or m; empty for a model that cannot be simulated
@@ -62,6 +71,8 @@ pub struct Forward {
     pub records: Vec<Simulated>,
     /// units of the deviations by actuator
     pub units: Vec<&'static str>,
+    /// the feedback of the logs' controller, or why a soft spring stands in its place
+    pub held: Option<std::result::Result<Feedback, String>>,
     /// models that could not be simulated, in words
     pub failed: Vec<String>,
 }
@@ -88,20 +99,29 @@ pub fn effects_torque(
 }
 
 /// Simulates with the parameters of the three [`MODELS`]; the torque of the effects acts in the last.
-pub fn forward(data: &Data, phi: [&[f64]; 3], effects: &[Vec<f64>]) -> Forward {
+/// `held` is the feedback that answers deviations, or why it is not known.
+pub fn forward(
+    data: &Data,
+    phi: [&[f64]; 3],
+    effects: &[Vec<f64>],
+    held: std::result::Result<Feedback, String>,
+) -> Forward {
     let count = data.plant.parameters().len();
     let robots = phi.map(|phi| with_values(data.plant, &phi[..count]));
-    let held: Vec<usize> = (0..data.records.len())
+    let kept: Vec<usize> = (0..data.records.len())
         .filter(|k| !data.records[*k].fit)
         .collect();
-    let chosen = if held.is_empty() { vec![0] } else { held };
+    let chosen = if kept.is_empty() { vec![0] } else { kept };
     let tasks: Vec<(usize, usize)> = chosen
         .iter()
         .flat_map(|k| (0..3).map(|m| (*k, m)))
         .collect();
     let mut runs = tasks
         .par_iter()
-        .map(|(k, m)| run(data, *k, &robots[*m], (*m == 2).then_some(effects)))
+        .map(|(k, m)| {
+            let effects = (*m == 2).then_some(effects);
+            run(data, *k, &robots[*m], effects, held.as_ref().ok())
+        })
         .collect::<Vec<_>>()
         .into_iter();
     let mut out = Forward {
@@ -112,25 +132,26 @@ pub fn forward(data: &Data, phi: [&[f64]; 3], effects: &[Vec<f64>]) -> Forward {
     };
     for k in chosen {
         let r = &data.records[k];
-        let deviation = MODELS.map(|model| match runs.next() {
-            Some(Ok(deviation)) => deviation,
-            Some(Err(e)) => {
-                out.failed.push(format!("{}, {model} model: {e}", r.name));
-                Vec::new()
+        let [mut deviation, mut torque] = [const { [const { Vec::new() }; 3] }; 2];
+        for (m, model) in MODELS.into_iter().enumerate() {
+            match runs.next() {
+                Some(Ok(of)) => [deviation[m], torque[m]] = of,
+                Some(Err(e)) => out.failed.push(format!("{}, {model} model: {e}", r.name)),
+                None => {}
             }
-            None => Vec::new(),
-        });
+        }
         let rms = |x: &Vec<f64>| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt();
+        let each = |x: &Vec<Vec<f64>>| (!x.is_empty()).then(|| x.iter().map(rms).collect());
         out.records.push(Simulated {
             record: r.name.clone(),
             fit: r.fit,
-            rms: std::array::from_fn(|m| {
-                (!deviation[m].is_empty()).then(|| deviation[m].iter().map(rms).collect())
-            }),
+            rms: deviation.each_ref().map(each),
+            torque: torque.each_ref().map(each),
             t: (0..length(r)).map(|i| i as f64 * r.dt).collect(),
             deviation,
         });
     }
+    out.held = Some(held);
     out
 }
 
@@ -139,13 +160,46 @@ fn length(r: &Record) -> usize {
     r.count.min((LONGEST / r.dt) as usize + 1)
 }
 
-/// Deviation from record `k` by actuator.
+/// What a feedback answers, as generalised forces: `stiff e + damping ė + slow`.
+struct Answer {
+    stiff: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    slow: DVector<f64>,
+}
+
+impl Answer {
+    /// Of an identified feedback, with the nominal mass matrix and the integral of the deviation.
+    fn of(f: &Feedback, d_a: &DMatrix<f64>, mass: &DMatrix<f64>, sum: &DVector<f64>) -> Self {
+        let of = |part: usize| match f.kind {
+            Acts::Actuators => {
+                let (na, m) = d_a.shape();
+                d_a.tr_mul(&DMatrix::from_fn(na, m, |j, c| {
+                    f.gains[j][part] * d_a[(j, c)]
+                }))
+            }
+            Acts::InverseDynamics => mass * f.gains[0][part],
+        };
+        Answer {
+            stiff: of(0),
+            damping: of(1),
+            slow: match f.kind {
+                Acts::Actuators => {
+                    d_a.tr_mul(&DVector::from_fn(sum.len(), |j, _| f.gains[j][2] * sum[j]))
+                }
+                Acts::InverseDynamics => of(2) * sum,
+            },
+        }
+    }
+}
+
+/// Deviation from record `k` by actuator, and the torque by which the controller answers it.
 fn run(
     data: &Data,
     k: usize,
     robot: &Robot,
     effects: Option<&[Vec<f64>]>,
-) -> Result<Vec<Vec<f64>>> {
+    held: Option<&Feedback>,
+) -> Result<[Vec<Vec<f64>>; 2]> {
     let (plant, r) = (data.plant, &data.records[k]);
     let (m, n, na) = (plant.coordinates(), robot.dof(), data.joints());
     let bodies = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
@@ -165,12 +219,19 @@ fn run(
             row.iter().fold(0.0f64, |a, v| a.max((v - row[0]).abs()))
         })
         .fold(1.0, f64::max);
+    let mut nominal = Dynamics::nominal(plant);
     let (mut e, mut ed) = (DVector::zeros(m), DVector::zeros(m));
+    // integral of the deviation, of the actuators or of the coordinates
+    let mut sum = DVector::zeros(match held {
+        Some(f) if f.kind == Acts::Actuators => na,
+        _ => m,
+    });
     let mut out = vec![Vec::with_capacity(length(r)); na];
+    let mut torque = out.clone();
     for i in 0..length(r) {
         let (v, a) = (at(&r.x.qd, i), at(&r.x.qdd, i));
         let terms = dynamics.terms(&(at(&r.x.q, i) + &e), &(&v + &ed))?;
-        let moved = &terms.d_a * &e;
+        let moved: DVector<f64> = &terms.d_a * &e;
         out.iter_mut()
             .zip(moved.iter())
             .for_each(|(o, x)| o.push(*x));
@@ -180,11 +241,30 @@ fn run(
         });
         let steady = &terms.d * &v;
         let opposed = terms.d.tr_mul(&(viscous.component_mul(&steady) + &offset));
-        let force = terms.d_a.tr_mul(&tau) - &terms.mass * (&a + &e * omega.powi(2)) - &terms.bias;
+        let Answer {
+            stiff,
+            damping,
+            slow,
+        } = match held {
+            None => Answer {
+                stiff: &terms.mass * omega.powi(2),
+                damping: &terms.mass * (2.0 * omega),
+                slow: DVector::zeros(m),
+            },
+            Some(f) => {
+                let mass = nominal.terms(&at(&r.x.q, i), &v)?.mass;
+                sum += match f.kind {
+                    Acts::Actuators => &moved * h,
+                    Acts::InverseDynamics => &e * h,
+                };
+                Answer::of(f, &terms.d_a, &mass, &sum)
+            }
+        };
+        let force = terms.d_a.tr_mul(&tau) - &terms.mass * &a - &stiff * &e - &slow - &terms.bias;
         let slope = terms
             .d
             .tr_mul(&DMatrix::from_fn(n, m, |j, c| viscous[j] * terms.d[(j, c)]));
-        let left = &terms.mass * (1.0 + 2.0 * omega * h + (omega * h).powi(2)) + slope * h;
+        let left = &terms.mass + (&damping + slope + &stiff * h) * h;
         let Some(left) = left.cholesky() else {
             return Err(Error::Infeasible(format!(
                 "its mass matrix is not positive definite at {:.3} s: no such robot exists",
@@ -201,7 +281,12 @@ fn run(
             &coulomb,
         );
         ed = free - spread * friction;
+        let sent = actuation(&terms.d_a) * (&stiff * &e + &damping * &ed + &slow);
         e += &ed * h;
+        torque
+            .iter_mut()
+            .zip(sent.iter())
+            .for_each(|(o, x)| o.push(*x));
         if !e.iter().all(|x| x.abs() < 10.0 * span) {
             return Err(Error::Infeasible(format!(
                 "the simulated robot leaves the recorded motion at {:.3} s",
@@ -209,5 +294,5 @@ fn run(
             )));
         }
     }
-    Ok(out)
+    Ok([out, torque])
 }

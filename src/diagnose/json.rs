@@ -33,6 +33,7 @@ fn finding(f: &Finding) -> Value {
         "holdout_shrink": number(f.holdout),
         "visibility": number(f.visibility),
         "decoys": f.decoys.map(number),
+        "unsteady": f.unsteady.map(number),
         "parameters": parameters,
         "indistinguishable_from": f.same,
         "in_the_set": f.member,
@@ -49,12 +50,17 @@ fn forward(d: &Diagnosis) -> Value {
         .records
         .iter()
         .map(|r| {
-            let of = |model: usize, j: usize| r.rms[model].as_ref().map(|rms| number(rms[j]));
+            let of = |rms: &[Option<Vec<f64>>; 3], model: usize, j: usize| {
+                rms[model].as_ref().map(|rms| number(rms[j]))
+            };
             let joints: Vec<Value> = (0..d.joints.len())
                 .map(|j| {
                     let mut out = json!({ "joint": d.joints[j], "unit": f.units[j] });
                     for (m, model) in MODELS.into_iter().enumerate() {
-                        out[model] = json!(of(m, j));
+                        out[model] = json!(of(&r.rms, m, j));
+                        if let Some(Ok(_)) = f.held {
+                            out["torque"][model] = json!(of(&r.torque, m, j));
+                        }
                     }
                     out
                 })
@@ -67,12 +73,29 @@ fn forward(d: &Diagnosis) -> Value {
             })
         })
         .collect();
-    json!({
-        "quantity": "rms deviation of the position from the log, driven by the recorded torque and held by a soft spring",
-        "bandwidth": BANDWIDTH,
+    let mut out = json!({
+        "quantity": "rms deviation of the position from the log",
         "records": records,
         "not_simulated": f.failed,
-    })
+    });
+    match &f.held {
+        Some(Ok(c)) => {
+            out["driven_by"] = json!("commanded positions");
+            out["controller"] = json!({
+                "kind": c.kind,
+                "gains": c.gains.iter().map(|g| numbers(g)).collect::<Vec<_>>(),
+                "left_of_torque": numbers(&c.left),
+                "soft_springs": c.soft.iter().map(|j| &d.joints[*j]).collect::<Vec<_>>(),
+            });
+        }
+        Some(Err(why)) => {
+            out["driven_by"] = json!("recorded torques, with a soft spring");
+            out["bandwidth"] = json!(BANDWIDTH);
+            out["controller_unknown"] = json!(why);
+        }
+        None => {}
+    }
+    out
 }
 
 /// The file, with the keys of `docs/formats.md`.
@@ -143,6 +166,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         })).collect::<Vec<_>>(),
         "forward_simulation": forward(d),
         "prior_surprise": numbers(&d.surprise),
+        "prior_closeness": numbers(&d.closeness),
         "torque_window": number(d.window),
         "warnings": d.warnings,
         "seconds": number(seconds),

@@ -7,13 +7,14 @@
 //!
 //! | step | module | what it gives |
 //! |---|---|---|
+//! | prior | [`closeness`] | how close an identified model is |
 //! | records | [`record`], [`noise`] | motion and derivatives, noise floor, whitening |
 //! | nominal | [`data`], [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
 //! | search | [`search`], [`verdict`] | sets of effects, rivals, confidence |
 //! | intervals | [`interval`] | how sure the share is that an effect explains |
 //! | gap | [`gap`] | residuals against noise: joints, odd, even, non-periodic |
-//! | simulation | [`forward`] | the robot simulated under the recorded torques, before and after |
+//! | simulation | [`forward`], [`controller`] | the robot simulated under the same commands, before and after |
 //! | next | [`next`] | the motion that tells rivals apart |
 //! | output | [`json`], [`page`], [`improve`] | `diagnosis.json`, report, improved robot |
 //!
@@ -21,6 +22,8 @@
 
 pub mod catalogue;
 pub mod closed;
+pub mod closeness;
+pub mod controller;
 pub mod data;
 pub mod decoy;
 pub mod evidence;
@@ -101,6 +104,8 @@ pub struct Finding {
     /// the most that a decoy, the effect moved in time, gains of its own over what the effect gains; of
     /// members of the set
     pub decoys: Option<f64>,
+    /// what coefficients of their own for every fitted record gain over what the effect gains; of members
+    pub unsteady: Option<f64>,
     /// parameters
     pub values: Vec<Value>,
     /// effects that this data cannot tell from it
@@ -193,6 +198,8 @@ pub struct Diagnosis {
     pub warnings: Vec<Warning>,
     /// threshold and scale: penalty of the prior before and after
     pub surprise: [f64; 2],
+    /// factors on the deviations of the prior that the records find likeliest
+    pub closeness: closeness::Closeness,
     /// window of the torque channel, samples squared beyond ±1 sample
     pub window: f64,
 }
@@ -219,22 +226,27 @@ pub fn raw(experiment: &Experiment) -> Result<Vec<Raw>> {
                 t: r.t.clone(),
                 q: r.q.clone(),
                 tau: r.tau.clone(),
+                qref: r.qref.clone(),
             };
             // stamps that jitter about a clock are not believed before the samples were compared
             // both ways; interpolation to an even grid would smooth the torque for good
-            if let Some([t, q, tau]) = as_written(r) {
-                raw.t = t.into_iter().flatten().collect();
+            if let Some((t, [q, tau, qref])) = as_written(r) {
+                raw.t = t;
                 raw.q = q;
                 raw.tau = tau;
+                raw.qref = r.qref.is_some().then_some(qref);
             }
             Ok(raw)
         })
         .collect()
 }
 
-/// Times, positions and torques as they stand in the file, where every value is sound and no sample
-/// is missing.
-fn as_written(r: &crate::log::Record) -> Option<[Vec<Vec<f64>>; 3]> {
+/// One channel an actuator.
+type Columns = Vec<Vec<f64>>;
+
+/// Times, and positions, torques and commanded positions as they stand in the file, where every value
+/// is sound and no sample is missing.
+fn as_written(r: &crate::log::Record) -> Option<(Vec<f64>, [Columns; 3])> {
     let n = r.actuators();
     let wanted = |name: &str| name == "t" || name.starts_with('q') || name.starts_with("tau");
     let mut table = crate::log::Table::read(&r.path, &wanted).ok()?;
@@ -244,18 +256,19 @@ fn as_written(r: &crate::log::Record) -> Option<[Vec<Vec<f64>>; 3]> {
         column.iter().all(|v| v.is_finite()).then_some(column)
     };
     let t = take("t".into())?;
-    let q = (1..=n)
-        .map(|j| take(format!("q{j}")))
-        .collect::<Option<_>>()?;
-    let tau = (1..=n)
-        .map(|j| take(format!("tau{j}")))
-        .collect::<Option<_>>()?;
+    let mut all =
+        |group: &str| -> Option<Columns> { (1..=n).map(|j| take(format!("{group}{j}"))).collect() };
+    let (q, tau) = (all("q")?, all("tau")?);
+    let qref = match r.qref {
+        Some(_) => all("qref")?,
+        None => Vec::new(),
+    };
     let mean = (t.last()? - t.first()?) / (t.len() - 1).max(1) as f64;
     let regular = t
         .iter()
         .enumerate()
         .all(|(i, v)| (v - t[0] - i as f64 * mean).abs() < 0.5 * mean);
-    regular.then_some([vec![t], q, tau])
+    regular.then_some((t, [q, tau, qref]))
 }
 
 /// Records ready for the diagnosis: noise, window of the torque channel, ordinary imperfections.
@@ -333,12 +346,19 @@ pub fn of_logs(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
     progress("noise and nominal model");
-    let data = prepare(plant, raws)?;
+    let mut data = prepare(plant, raws)?;
+    let effects = catalogue::all();
+    let close = {
+        let evidence = Evidence::new(&data, 1.0);
+        let phi = evidence.parameters(&[], &evidence.fit(&[]));
+        closeness::estimate(&evidence, &Context::new(&data, phi)?, &effects)
+    };
+    data.tighten(close);
+    let data = data;
     let evidence = Evidence::new(&data, 1.0);
     let none = evidence.fit(&[]);
     let phi = evidence.parameters(&[], &none);
     let cx = Context::new(&data, phi)?;
-    let effects = catalogue::all();
     progress("every effect at every place");
     let list = search::singles(&evidence, &cx, &effects, &[]);
     let decision = verdict::decide(&evidence, &cx, &effects, &list, progress);
@@ -405,6 +425,7 @@ pub fn of_logs(
             holdout: m.holdout,
             visibility: m.visibility,
             decoys: m.decoys,
+            unsteady: m.unsteady,
             values: effect.values(&cx, &c.place, &c.shape, &c.eta, &m.std),
             same,
             member: true,
@@ -437,6 +458,7 @@ pub fn of_logs(
                 holdout: main.holdout * (1.0 - r.loss).clamp(0.0, 1.0),
                 visibility: of.visibility,
                 decoys: None,
+                unsteady: None,
                 values: effect.values(&cx, &r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
                 same: if r.weight > 0.25 {
                     vec![main.effect]
@@ -453,7 +475,8 @@ pub fn of_logs(
     let records = record_gaps(&data, &frozen, &refit, &after);
     progress("forward simulation");
     let added = forward::effects_torque(&cx, &effects, &decision.members);
-    let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added);
+    let held = controller::identify(&data, &evidence.phi);
+    let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
     let untestable = untestable(&data, &list, &effects);
     let fitted = |r: &Record| r.fit;
     let noise_source = match data.noise[0].source {
@@ -492,6 +515,7 @@ pub fn of_logs(
         forward,
         warnings: Vec::new(),
         surprise: decision.surprise,
+        closeness: data.closeness,
         window: data.window,
     })
 }

@@ -1,5 +1,6 @@
 //! The report: where the gap lies, what causes it, how far it shrinks, what to run next.
 
+use super::controller::Kind;
 use super::next::Proposal;
 use super::{Diagnosis, Finding, Verdict};
 use crate::report::format::{percent, significant};
@@ -171,7 +172,10 @@ fn effects(d: &Diagnosis) -> Markup {
             html! { (percent(f.explains)) @if f.member { div { small { (percent(f.interval[0])) "–" (percent(f.interval[1])) } } } },
             html! { (percent(f.holdout)) },
             html! { (percent(f.visibility)) @if f.frozen { div { small { "against the prior" } } } },
-            html! { @if let Some(d) = f.decoys { (percent(d)) } @else { "–" } },
+            html! {
+                @if let Some(d) = f.decoys { (percent(d)) } @else { "–" }
+                div { small { @if let Some(u) = f.unsteady { "unsteady " (percent(u)) } } }
+            },
             values(f),
             html! { @if f.same.is_empty() { "–" } @else { (f.same.join(", ").replace('_', " ")) } },
         ]
@@ -192,7 +196,8 @@ fn effects(d: &Diagnosis) -> Markup {
         p { "An effect is claimed from a confidence of 50 % on. " strong { "Explains" } " is the share of the gap above the \
             noise that goes when the effect is added to the others; " strong { "visible" } " the share of the effect that the \
             nominal model cannot absorb by other parameters; " strong { "decoys" } " the most that the effect explains of its own when it \
-            is moved in time, over what it explains in place: near 100 % it is as good as any signal." }
+            is moved in time, over what it explains in place: near 100 % it is as good as any signal; " strong { "unsteady" } " \
+            what coefficients of their own for every record would add to that, near 0 % where it is the same in all." }
         (table(&head, &[1, 7, 8], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
         @if !rest.is_empty() {
             (details("Rivals: what else could stand in their place", table(&head, &[1, 7, 8],
@@ -276,7 +281,13 @@ fn residuals(d: &Diagnosis) -> Markup {
         }))
         (table(&["joint", "noise", "frozen model", "refitted", "with the effects", "share"], &[], &rows))
         p { "rms above the noise over the fitted records. The noise floor comes from " (d.noise_source) ". The refit moves the \
-            nominal parameters within what is ordinary for a model of this origin (its prior)." }
+            nominal parameters within what is ordinary for a model of this origin (its prior)."
+            @if d.closeness.iter().any(|c| *c < 1.0) {
+                " The records agree with this identified model so well that its links are allowed less: "
+                (percent(d.closeness[0])) " of that in mass, first moment and rotors, "
+                (percent(d.closeness[1])) " in tensors."
+            }
+        }
     }
 }
 
@@ -485,9 +496,16 @@ fn simulated(d: &Diagnosis) -> Markup {
     let mut rows = Vec::new();
     for r in &f.records {
         for j in 0..d.joints.len() {
-            let cell = |m: usize| match &r.rms[m] {
-                Some(rms) => html! { (significant(rms[j], 3)) " " (f.units[j]) },
+            let figure = |of: &Option<Vec<f64>>, unit: &str| match of {
+                Some(rms) => html! { (significant(rms[j], 3)) " " (unit) },
                 None => html! { "–" },
+            };
+            // what the controller sends for it, where there is one
+            let cell = |m: usize| {
+                html! {
+                    (figure(&r.rms[m], f.units[j]))
+                    @if let Some(Ok(_)) = f.held { ", " (figure(&r.torque[m], d.units[j])) }
+                }
             };
             let shrinks = match (&r.rms[1], &r.rms[2]) {
                 (Some(a), Some(b)) if a[j] > 0.0 => percent(1.0 - b[j] / a[j]),
@@ -508,17 +526,41 @@ fn simulated(d: &Diagnosis) -> Markup {
         false => "holdout records",
     };
     html! {
-        p { "The robot simulated under the recorded torque of the " (kind) ", at most "
-            (significant(super::forward::LONGEST, 2)) " s of each: rms of its deviation from the recorded position. A soft spring \
-            and damper of " (significant(super::forward::BANDWIDTH, 2)) " Hz hold it, for no model stays on a path that is driven by \
-            torque alone; so the figures compare models, and are no tracking errors under the robot's own controller. Effects act as \
-            the torque that they have along the recorded motion." }
+        p { "Simulated: the " (kind) ", at most " (significant(super::forward::LONGEST, 2)) " s of each; rms of the deviation from \
+            the recorded position. " (driven(d)) " Effects act as the torque that they have along the recorded motion." }
         (figure(svg, html! {
             (legend(&[0, 1, 2].map(|m| (colours[m], Shape::Line, names[m]))))
             "The joints with the largest share of the gap in " (first.record) "."
         }))
         (table(&["record", "joint", names[0], names[1], names[2], "less than refitted by"], &[0, 1], &rows))
         @for why in &f.failed { p { "Not simulated: " (why) } }
+    }
+}
+
+/// What drives the simulated robot.
+fn driven(d: &Diagnosis) -> Markup {
+    match &d.forward.held {
+        Some(Ok(c)) => {
+            let known = (0..c.left.len()).filter(|j| !c.soft.contains(j));
+            let left = known.map(|j| c.left[j]).fold(0.0, f64::max);
+            html! {
+                "The simulated robot is under the same commands: its controller, identified from the commanded positions and the torques of \
+                 the logs " @match c.kind {
+                    Kind::Actuators => { "(feedback of every joint on its own; " }
+                    Kind::InverseDynamics => { "(inverse dynamics; " }
+                } "it leaves at most " (percent(left)) " of a joint's torque), sends what was recorded less its answer to the deviation, whose rms stands beside."
+                @if !c.soft.is_empty() {
+                    " The gains of " (c.soft.iter().map(|j| d.joints[*j].as_str()).collect::<Vec<_>>().join(", "))
+                    " are not certain; a soft spring stands in their place."
+                }
+            }
+        }
+        held => html! {
+            "The recorded torque drives the simulated robot, and a soft spring and damper of "
+            (significant(super::forward::BANDWIDTH, 2)) " Hz hold it, for no model stays on a path that is driven by torque alone; so the \
+             figures compare models, and are no tracking errors under the robot's own controller"
+            @if let Some(Err(why)) = held { ": " (why) } "."
+        },
     }
 }
 

@@ -32,6 +32,8 @@ pub struct Raw {
     pub q: Vec<Vec<f64>>,
     /// actuator torques, one column each
     pub tau: Vec<Vec<f64>>,
+    /// commanded positions of the actuators, one column each, where they were logged
+    pub qref: Option<Vec<Vec<f64>>>,
 }
 
 /// A record on a uniform grid with its motion.
@@ -51,6 +53,8 @@ pub struct Record {
     pub x: Samples,
     /// motion of the actuators (the same for a serial robot)
     pub actuators: Samples,
+    /// commanded motion of the actuators, where it was logged
+    pub reference: Option<Samples>,
     /// measured torque, actuator-major
     pub tau: Vec<f64>,
     /// standard deviation of a measured position, by actuator
@@ -168,6 +172,13 @@ impl Record {
             Some(cycle) => periodic(&q, &steps, count, cycle, dt),
             None => smooth(&q, &steps, count, dt),
         };
+        let reference = raw.qref.as_ref().map(|columns| {
+            let (q, exact) = (grid(columns, stamped), vec![0.0; n]);
+            match cycle {
+                Some(cycle) => periodic(&q, &exact, count, cycle, dt).0,
+                None => smooth(&q, &exact, count, dt).0,
+            }
+        });
         let (x, actuators) = match plant.mechanism() {
             None => (motion.clone(), motion),
             Some(mechanism) => {
@@ -183,6 +194,7 @@ impl Record {
             cycle,
             x,
             actuators,
+            reference,
             tau,
             position_noise,
             band,
@@ -385,6 +397,15 @@ fn periodic(
         .map(|(v, s)| v.max(*s).sqrt())
         .collect();
     (out, noise, band)
+}
+
+/// A signal limited to the band of the positions: the mean period up to [`BAND`] where the motion
+/// repeats, low-passed as they are otherwise.
+pub(super) fn limited(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
+    match cycle {
+        Some(cycle) => periodic(x, &[0.0], x.len(), cycle, dt).0.q,
+        None => smooth(x, &[0.0], x.len(), dt).0.q,
+    }
 }
 
 /// Low-passed positions and their central differences.

@@ -10,7 +10,7 @@
 //!    its joints, of how that holds on holdout records, and of its share against its rivals.
 
 use super::catalogue::{Context, Effect};
-use super::data::Data;
+use super::data::{Column, Data};
 use super::decoy;
 use super::evidence::{Evidence, Fit, Projected};
 use super::gap;
@@ -53,6 +53,9 @@ pub struct Member {
     /// the most that a decoy gains of its own, over what the effect gains; not of an effect that shows in
     /// parameters alone
     pub decoys: Option<f64>,
+    /// what coefficients of their own for every fitted record gain, over what the effect gains; not of an
+    /// effect that remembers, nor of whole sets of inertial parameters that show in parameters alone
+    pub unsteady: Option<f64>,
     /// rivals by falling weight
     pub rivals: Vec<Rival>,
     /// standard deviations of the coefficients
@@ -117,6 +120,19 @@ const LEAST_RINGING: f64 = 0.35;
 const HELD: f64 = 0.5;
 /// What a decoy may gain beyond what it shares with the effect, over what the effect gains.
 const DECOY: f64 = 0.22;
+/// What an effect must have of mattering and predicting to enter the set at all: one that could never
+/// be claimed would stand in the way of others.
+const ENTERS: f64 = 0.15;
+/// How much more an effect must gain than another on its joint to be the cause of what that one explains.
+const FAR: f64 = 5.0;
+/// What coefficients of their own for every record may gain, over what the effect gains.
+const UNSTEADY: f64 = 0.15;
+/// Gain that a freedom may bring from noise that is not quite white.
+const FREEDOM: f64 = 6.0;
+/// Columns up to which an effect that hides in parameters can be compared between records.
+const FEW: usize = 4;
+/// Squared signal on a joint, in noise variances, below which a pair of joints is not seen on it.
+const UNSEEN: f64 = 25.0;
 /// Gain of prior plausibility above which parameters are not ordinary errors.
 const SURPRISE: f64 = 45.0;
 
@@ -129,6 +145,8 @@ struct State<'a> {
     effects: &'a [Box<dyn Effect>],
     /// what a sound model leaves, per row
     floor: f64,
+    /// gap of the refitted nominal model above that, fitted records
+    total: f64,
 }
 
 impl State<'_> {
@@ -173,10 +191,12 @@ impl State<'_> {
     }
 
     /// Whether member `i` may show in nothing but the parameters that the nominal model would need.
-    /// Not where another one shows on its joints: what that one's formula misses moves them, too.
+    /// Not where another one shows on its joints, or hides there and is far larger: what that one's
+    /// formula misses moves them, too.
     fn may_hide(&self, set: &[Candidate], i: usize) -> bool {
         let hides = |c: &Candidate| self.effects[c.effect].hides();
-        let shown = |c: &Candidate| !hides(c) && c.place.iter().any(|j| set[i].place.contains(j));
+        let larger = |c: &Candidate| !hides(c) || c.gain > FAR * set[i].gain;
+        let shown = |c: &Candidate| larger(c) && c.place.iter().any(|j| set[i].place.contains(j));
         hides(&set[i]) && !set.iter().any(shown)
     }
 
@@ -186,6 +206,35 @@ impl State<'_> {
             return (0..self.evidence.data.joints()).collect();
         }
         c.place.clone()
+    }
+
+    /// Whether an effect depends on what went on before a record began.
+    fn remembers(&self, c: &Candidate) -> bool {
+        self.effects[c.effect].remembers()
+    }
+
+    /// Whether an effect explains enough to be a finding, 0 to 1, from the gap by actuator without it
+    /// and with it: what explains next to nothing is none; nor is anything where the gap without it is
+    /// what a sound model leaves.
+    fn matters(&self, c: &Candidate, without: &[f64], with: &[f64]) -> f64 {
+        let rows = self.evidence.data.fitted as f64;
+        let joints = self.joints_of(c);
+        let over = |gap: &[f64]| -> f64 {
+            let floor = self.floor * rows;
+            joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
+        };
+        let seen = (over(without) - over(with)) / over(without).max(1e-9);
+        let explains = (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9);
+        let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+        let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
+        let ringing = match self.effects[c.effect].rings(&c.shape) {
+            true => logistic((own - LEAST_RINGING) / 0.04),
+            false => 1.0,
+        };
+        logistic((seen - LEAST_SHARE) / 0.01)
+            * logistic((explains - LEAST_OF_ALL) / 0.003)
+            * logistic((there - LEAST_GAP) / 0.02)
+            * ringing
     }
 
     /// Improves the shapes of all members in turn.
@@ -352,6 +401,7 @@ pub fn decide(
         cx,
         effects,
         floor: 0.0,
+        total: 0.0,
     };
     let data = evidence.data;
     let rows = data.fitted as f64;
@@ -364,6 +414,7 @@ pub fn decide(
     let largest = before.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
     st.floor = FLOOR.min(0.3 * largest);
     let total = st.above(&before, true);
+    st.total = total;
     let visible = before.iter().any(|v| *v > SOUND * rows);
     let surprising = surprise > SURPRISE + 2.0 * free;
     let mut set: Vec<Candidate> = Vec::new();
@@ -420,7 +471,7 @@ pub fn decide(
     let mut members: Vec<Member> = (0..set.len())
         .into_par_iter()
         .with_max_len(1)
-        .map(|i| judge(&st, list, &set, i, &after, surprise_after, total))
+        .map(|i| judge(&st, list, &set, i, &after, surprise_after))
         .collect();
     // coefficients of the common fit
     let mut at = 0;
@@ -469,7 +520,7 @@ fn gained(st: &State, set: &[Candidate], i: usize) -> f64 {
 }
 
 /// By how much coefficients are less certain than independent samples of unit noise would make them.
-fn inflation(residual: &[Vec<f64>], fitted: usize) -> f64 {
+pub(super) fn inflation(residual: &[Vec<f64>], fitted: usize) -> f64 {
     let mut power = 0.0;
     let mut rho = 0.0;
     for e in residual {
@@ -498,13 +549,17 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let gap = st.gap(&r0, true);
     let there: f64 = st.joints_of(&set[i]).iter().map(|j| gap[*j].max(0.0)).sum();
     let significant = visible > LEAST * rows && visible > 0.02 * there;
-    let generalises = held == 0 || hold > 0.25 * visible * held as f64 / rows;
+    // as much a row as on the fitted records, or, where the holdout moves less, as much as predicted
+    let predicted = predicts(data, &r0, &r1);
+    let generalises = held == 0 || hold > 0.25 * visible * held as f64 / rows || predicted > HELD;
     if significant && generalises {
-        return true;
+        let after = st.gap(&r1, true);
+        let worth = st.matters(&set[i], &gap, &after);
+        return worth > ENTERS && (st.remembers(&set[i]) || predicted > ENTERS);
     }
     st.may_hide(set, i)
         && prior > SURPRISE
-        && prior > 0.5 * visible.abs()
+        && (generalises || prior > 0.5 * visible.abs())
         && (held == 0 || hold > -0.02 * held as f64)
 }
 
@@ -541,7 +596,6 @@ fn judge(
     i: usize,
     after: &[f64],
     surprise_after: f64,
-    total: f64,
 ) -> Member {
     let data = st.evidence.data;
     let rows = data.fitted as f64;
@@ -563,7 +617,13 @@ fn judge(
     let fall = surprise_without - surprise_after;
     let prior = fall / (surprise_without - free).max(1.0);
     let chi_gain = gain - fall;
-    let frozen = st.may_hide(set, i) && chi_gain < 0.5 * gain && fall > SURPRISE;
+    // what an effect explains of the residual may be too little to judge it by, although its parameters
+    // stand out
+    let in_rows = logistic((chi_gain / rows - LEAST) / 0.02);
+    let faint = in_rows * st.matters(c, &without, after) < 0.5;
+    let frozen = st.may_hide(set, i)
+        && fall > SURPRISE
+        && (faint || chi_gain < (0.5 * gain).max(1.5 * LEAST * rows));
     let share = if frozen { prior } else { visible };
     let held = data.rows() - data.fitted;
     let (hw, ha) = (sum(&st.gap(&r0, false)), sum(&st.gap(&r1, false)));
@@ -643,7 +703,7 @@ fn judge(
     let size = if frozen {
         logistic((fall - SURPRISE) / 12.0)
     } else {
-        logistic((chi_gain / rows - LEAST) / 0.02)
+        in_rows
     };
     // an effect that explains a part only is believed where nothing else comes near that part
     let best = rivals
@@ -664,7 +724,7 @@ fn judge(
     let explains = if frozen {
         1.0 - all_after / whole(&st.evidence.r, true).max(1e-9)
     } else {
-        (all_without - all_after) / total.max(1e-9)
+        (all_without - all_after) / st.total.max(1e-9)
     };
     let hold_all = |e: &[Vec<f64>]| st.above(&st.gap(e, false), false);
     let hold_total = hold_all(&st.fit(&[]).1);
@@ -675,42 +735,34 @@ fn judge(
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
-    // what explains next to nothing is no finding; nor is anything where the gap without it is what a
-    // sound model leaves
     let matters = match frozen {
         true => 1.0,
-        false => {
-            let over = |gap: &[f64]| -> f64 {
-                let floor = st.floor * rows;
-                joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
-            };
-            let seen = (over(&without) - over(after)) / over(&without).max(1e-9);
-            let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
-            let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
-            let ringing = match effect.rings(&c.shape) {
-                true => logistic((own - LEAST_RINGING) / 0.04),
-                false => 1.0,
-            };
-            logistic((seen - LEAST_SHARE) / 0.01)
-                * logistic((explains - LEAST_OF_ALL) / 0.003)
-                * logistic((there - LEAST_GAP) / 0.02)
-                * ringing
-        }
+        false => st.matters(c, &without, after),
     };
-    let predicted = match frozen || effect.remembers() {
+    let predicted = match frozen || st.remembers(c) {
         true => 1.0,
         false => predicts(data, &r0, &r1),
     };
+    let columns = effect.columns(st.cx, &c.place, &c.shape, false);
     // what shows in parameters alone is no signal that could be moved
-    let decoys = (!frozen).then(|| {
-        let columns = effect.columns(st.cx, &c.place, &c.shape, false);
-        decoy::largest(st.evidence, (&columns, &c.projected), &c.eta, &beside, gain)
-    });
+    let decoys = (!frozen)
+        .then(|| decoy::largest(st.evidence, (&columns, &c.projected), &c.eta, &beside, gain));
+    // whole sets of inertial parameters fit anything in a single record
+    let unsteady = match st.remembers(c) || frozen && columns.len() > FEW {
+        true => None,
+        false => unsteady(st.evidence, &columns, &beside, f1.gain, gain),
+    };
     let together = size
+        * shown_on_both(data, c, &r0, &r1)
+        * unsteady.map_or(1.0, |u| logistic((UNSTEADY - u) / 0.02))
         * matters
         * logistic((predicted - HELD) / 0.05)
         * decoys.map_or(1.0, |d| logistic((DECOY - d) / 0.03))
-        * logistic((share - 0.55) / 0.07).max(alone)
+        * match frozen {
+            // nothing else may be odd about the parameters
+            true => logistic((share - 0.7) / 0.05),
+            false => logistic((share - 0.55) / 0.07).max(alone),
+        }
         * logistic((hold - 0.3) / 0.07).max(logistic((repeats - 0.45) / 0.07));
     Member {
         candidate: c.clone(),
@@ -720,6 +772,7 @@ fn judge(
         holdout: holdout.clamp(-1.0, 1.0),
         visibility: c.projected.visibility(Some(&c.eta)),
         decoys,
+        unsteady,
         rivals,
         std: Vec::new(),
         frozen,
@@ -743,6 +796,65 @@ fn predicts(data: &Data, r0: &[Vec<f64>], r1: &[Vec<f64>]) -> f64 {
         .sum();
     let fall = energy(r0, rows.clone()) - energy(r1, rows);
     (fall + nothing) / (taken + nothing)
+}
+
+/// What an effect gains from coefficients of its own in every fitted record, beyond what so many freedoms gain
+/// from noise, over what it gains (`own`) with the same in all: near 0 for one that is the same machine
+/// in every record. `None` with one record.
+fn unsteady(
+    evidence: &Evidence,
+    columns: &[Column],
+    beside: &[&Projected],
+    together: f64,
+    own: f64,
+) -> Option<f64> {
+    let data = evidence.data;
+    let fitted: Vec<usize> = (0..data.records.len())
+        .filter(|k| data.records[*k].fit)
+        .collect();
+    if fitted.len() < 2 {
+        return None;
+    }
+    let only = |column: &Column, k: usize| {
+        let rows = column.rows.iter().map(|(j, v)| {
+            let mut part = vec![0.0; v.len()];
+            part[data.span(k)].copy_from_slice(&v[data.span(k)]);
+            (*j, part)
+        });
+        Column {
+            rows: rows.collect(),
+        }
+    };
+    let apart: Vec<Vec<Column>> = fitted
+        .iter()
+        .map(|k| columns.iter().map(|c| only(c, *k)).collect())
+        .collect();
+    let projected = evidence.project_all(&apart);
+    let mut set = beside.to_vec();
+    set.extend(&projected);
+    let freedoms = ((fitted.len() - 1) * columns.len()) as f64;
+    let more = evidence.fit(&set).gain - together - FREEDOM * freedoms;
+    Some(more.max(0.0) / own.max(1e-9))
+}
+
+/// Whether an effect of a pair of joints is seen on both, 0 to 1: on rows of each the residual must fall by
+/// half of what the fit takes away there, as in [`predicts`]. 1 for other effects; little where one of the
+/// two joints is too noisy to tell, for then the effect may as well be another one on the other joint.
+fn shown_on_both(data: &Data, c: &Candidate, r0: &[Vec<f64>], r1: &[Vec<f64>]) -> f64 {
+    if c.place.len() < 2 {
+        return 1.0;
+    }
+    let on = |j: usize| -> f64 {
+        let rows = |e: &[Vec<f64>]| e[j][..data.fitted].to_vec();
+        let (a, b) = (rows(r0), rows(r1));
+        let taken: f64 = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum();
+        let fall: f64 = a.iter().zip(&b).map(|(a, b)| a * a - b * b).sum();
+        match taken < UNSEEN {
+            true => 0.3,
+            false => logistic((fall / taken - HELD) / 0.05),
+        }
+    };
+    c.place.iter().map(|j| on(*j)).fold(1.0, f64::min)
 }
 
 /// Effects that are the same thing by nature: an alias does not take confidence.

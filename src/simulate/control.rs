@@ -137,7 +137,7 @@ impl<'a> Tracker<'a> {
 }
 
 /// `D_a⁻ᵀ`, or its pseudo-inverse with more actuators than freedoms (forces of least norm).
-fn actuation(d_a: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn actuation(d_a: &DMatrix<f64>) -> DMatrix<f64> {
     let top = d_a.norm();
     d_a.transpose()
         .pseudo_inverse(1e-13 * top)

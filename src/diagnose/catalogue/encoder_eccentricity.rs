@@ -56,7 +56,7 @@ impl Effect for EncoderEccentricity {
     }
 
     fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
-        eta[0].hypot(eta[1]) < 0.3
+        eta[0].hypot(eta[1]) < 0.12
     }
 
     fn values(

@@ -171,6 +171,7 @@ impl Trial<'_> {
             cycle: Some(count),
             actuators: plant.actuator_motion(&x).ok()?,
             x,
+            reference: None,
             tau: vec![0.0; n * count],
             position_noise: vec![0.0; n],
             band: 20.0,
@@ -180,6 +181,7 @@ impl Trial<'_> {
         let noise = Some(self.data.noise.clone());
         let mut data = Data::with_noise(plant, vec![record], noise).ok()?;
         data.ordinary();
+        data.tighten(self.data.closeness);
         data.window = self.data.window;
         if data.parameters.len() != self.phi.len() {
             return None;

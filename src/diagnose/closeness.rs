@@ -1,0 +1,138 @@
+//! How close an identified model is to its robot: estimated from the records themselves.
+//!
+//! A robot file with `prior = "identified"` may be off by a percent or by a tenth of one. Were the
+//! looser figure taken for both, effects that a refit absorbs (a payload, the gain of a drive, a zero
+//! of an encoder) would pass as ordinary errors of a model that has none. So the deviations of the
+//! prior are scaled by factors `s ≤ 1`, one for masses, first moments and rotors and one for tensors,
+//! that the data find likeliest (empirical Bayes; MacKay 1992). In units of the prior, with
+//! `G = WᵀW`, `b = Wᵀr` and `S = diag(s)`,
+//!
+//! ```text
+//! −2 ln p(r | s, e) = rᵀr − bᵀ S A⁻¹ S b − gain(e) + ln det A + k_e ln N        A = 1 + S G S
+//! ```
+//!
+//! is least over `s` *and* over the effects `e` that a refit may absorb, or none: an effect that is
+//! there makes parameters seem off, and would pass for a model that is not close. Friction and offsets
+//! keep their deviations, as they change from day to day. Of the factors that are nearly as likely as the
+//! likeliest the loosest are taken. Energies are divided by what the refitted
+//! model leaves per row, so that a gap for which no effect stands does not count as precision.
+
+use super::catalogue::{Context, Effect};
+use super::data::Data;
+use super::evidence::{Evidence, Projected};
+use crate::plant::Kind;
+use crate::robot::{JointTerm, Prior};
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+use rayon::prelude::*;
+
+/// Factors that are tried.
+const SCALES: [f64; 7] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.125];
+
+/// How far `−2 ln p` may lie above the least: the 95 % point of χ² for one freedom.
+const LIKELY: f64 = 3.84;
+/// By how much the two factors may differ: robots of few joints hardly tell first moments from tensors, and one
+/// must not be taken for exact because the other can stand for it.
+const APART: f64 = 3.0;
+
+/// Factors on the deviations of the prior: of masses, first moments and rotors, and of tensors.
+pub type Closeness = [f64; 2];
+
+/// Factor of every parameter of the nominal model.
+pub fn factors(data: &Data, closeness: Closeness) -> Vec<f64> {
+    let of = |kind: &Kind| match kind {
+        Kind::Inertial { k, .. } => closeness[usize::from(*k > 3)],
+        Kind::Term { joint, term } if *joint != usize::MAX && *term == JointTerm::Armature => {
+            closeness[0]
+        }
+        Kind::Term { .. } => 1.0,
+    };
+    data.parameters.iter().map(|p| of(&p.kind)).collect()
+}
+
+/// Residual, model and one set of columns as the parameters see them, in units of the prior.
+struct Reduced {
+    /// `G`
+    gram: Mat<f64>,
+    /// `b`
+    pull: Mat<f64>,
+    /// of every effect: `WᵀZ`, `ZᵀZ`, `Zᵀr`
+    effects: Vec<[Mat<f64>; 3]>,
+}
+
+/// The factors that the records find likeliest; 1 for a model that does not claim to be identified.
+pub fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Closeness {
+    let data = evidence.data;
+    if data.plant.prior() != Prior::Identified {
+        return [1.0; 2];
+    }
+    let sets: Vec<_> = effects
+        .iter()
+        .filter(|e| e.hides())
+        .flat_map(|e| {
+            e.places(cx).into_iter().flat_map(move |place| {
+                let shapes = e.shapes(cx, &place);
+                shapes
+                    .into_iter()
+                    .map(move |shape| e.columns(cx, &place, &shape, true))
+            })
+        })
+        .filter(|c| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()))
+        .collect();
+    let samples = (data.fitted * data.joints()) as f64;
+    let level = (evidence.j0 / samples).max(1.0);
+    let projected: Vec<Projected> = sets
+        .par_chunks(8)
+        .flat_map_iter(|c| evidence.project_all(c))
+        .collect();
+    let [gram, pull] = evidence.normal_equations();
+    let reduced = Reduced {
+        gram: gram * (1.0 / level),
+        pull: pull * (1.0 / level),
+        effects: projected
+            .iter()
+            .map(|p| evidence.as_seen(p).map(|m| m * (1.0 / level)))
+            .collect(),
+    };
+    let pairs: Vec<Closeness> = SCALES
+        .iter()
+        .flat_map(|a| SCALES.iter().map(move |b| [*a, *b]))
+        .filter(|[a, b]| a.max(*b) < APART * a.min(*b))
+        .collect();
+    let costs: Vec<f64> = pairs
+        .par_iter()
+        .map(|c| cost(&reduced, &factors(data, *c), samples.ln()))
+        .collect();
+    // the loosest that are nearly as likely: robots of few joints say little about it
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let likely = (0..pairs.len()).filter(|i| costs[*i] <= least + LIKELY);
+    let product = |i: &usize| pairs[*i][0] * pairs[*i][1];
+    let loosest = likely.max_by(|a, b| product(a).total_cmp(&product(b)));
+    loosest.map_or([1.0; 2], |i| pairs[i])
+}
+
+/// `−2 ln p` less what does not depend on the factors, with the best effect or none.
+fn cost(reduced: &Reduced, s: &[f64], price: f64) -> f64 {
+    let p = s.len();
+    let a = Mat::from_fn(p, p, |i, k| {
+        reduced.gram[(i, k)] * s[i] * s[k] + f64::from(u8::from(i == k))
+    });
+    let Ok(factor) = a.llt(Side::Lower) else {
+        return f64::INFINITY;
+    };
+    let l = factor.L();
+    let log_det: f64 = (0..p).map(|i| 2.0 * l[(i, i)].ln()).sum();
+    let scaled = |m: &Mat<f64>| Mat::from_fn(p, m.ncols(), |i, k| s[i] * m[(i, k)]);
+    let pull = scaled(&reduced.pull);
+    let fitted = factor.solve(&pull);
+    let plain: f64 = (0..p).map(|i| pull[(i, 0)] * fitted[(i, 0)]).sum();
+    let gain = |[seen, own, with]: &[Mat<f64>; 3]| -> f64 {
+        let seen = scaled(seen);
+        let left = own - seen.transpose() * factor.solve(&seen);
+        let b = with - seen.transpose() * &fitted;
+        let b: Vec<f64> = (0..b.nrows()).map(|i| b[(i, 0)]).collect();
+        super::evidence::solve(&left, &b).gain - price * b.len() as f64
+    };
+    let best = reduced.effects.iter().map(gain).fold(0.0, f64::max);
+    log_det - plain - best
+}
