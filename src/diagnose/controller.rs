@@ -102,7 +102,12 @@ pub fn identify(data: &Data, phi: &[f64]) -> Result<Feedback, String> {
     });
     let badness = |f: &Feedback| -> f64 {
         let of = |(j, l): (usize, &f64)| (l * signals.rms(j) / data.noise[j].std).powi(2);
-        f.left.iter().enumerate().map(of).sum()
+        let left: f64 = f.left.iter().enumerate().map(of).sum();
+        // of two that are as good, as they are on a single axis, the plain one
+        match f.kind {
+            Kind::Actuators => left,
+            Kind::InverseDynamics => 1.02 * left,
+        }
     };
     let sound = |f: &Feedback| {
         let ok = |(j, l): (usize, &f64)| {
@@ -366,8 +371,9 @@ fn pushed(
         let q = DVector::from_fn(m, |c, _| x.q[c * x.count + i]);
         let terms = nominal.terms(&q, &rest)?;
         let inertia = actuation(&terms.d_a) * &terms.mass;
+        let at = |part: usize| DVector::from_iterator(m, errors.iter().map(|e| e[part][i]));
         for (part, out) in out.iter_mut().enumerate() {
-            let torque = &inertia * DVector::from_fn(m, |c, _| errors[c][part][i]);
+            let torque = &inertia * at(part);
             out.iter_mut()
                 .zip(torque.iter())
                 .for_each(|(o, v)| o.push(*v));

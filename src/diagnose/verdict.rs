@@ -115,7 +115,7 @@ const LEAST_OF_ALL: f64 = 0.012;
 const LEAST_GAP: f64 = 0.15;
 /// The same on its own joints for an effect that rings with damping: what friction at reversals starts in the loop of
 /// the controller, and positions do not resolve, rings too.
-const LEAST_RINGING: f64 = 0.35;
+const LEAST_RINGING: f64 = SOUND;
 /// Fall of the residual on holdout records over the fall that the fit predicts, at least.
 const HELD: f64 = 0.5;
 /// What a decoy may gain beyond what it shares with the effect, over what the effect gains.
