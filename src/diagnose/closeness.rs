@@ -60,12 +60,25 @@ struct Reduced {
     effects: Vec<[Mat<f64>; 3]>,
 }
 
-/// The factors that the records find likeliest; 1 for a model that does not claim to be identified.
-pub fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Closeness {
-    let data = evidence.data;
-    if data.plant.prior() != Prior::Identified {
-        return [1.0; 2];
+/// Scales the prior of a model that claims to be identified by the factors that the records find
+/// likeliest.
+///
+/// # Errors
+/// Poses that cannot be reached.
+pub fn tighten(data: &mut Data, effects: &[Box<dyn Effect>]) -> crate::Result<()> {
+    if data.plant.prior() == Prior::Identified {
+        let evidence = Evidence::new(data, 1.0);
+        let phi = evidence.parameters(&[], &evidence.fit(&[]));
+        let closeness = estimate(&evidence, &Context::new(data, phi)?, effects);
+        drop(evidence);
+        data.tighten(closeness);
     }
+    Ok(())
+}
+
+/// The factors that the records find likeliest.
+fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Closeness {
+    let data = evidence.data;
     let sets: Vec<_> = effects
         .iter()
         .filter(|e| e.hides())

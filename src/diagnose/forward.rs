@@ -56,7 +56,8 @@ pub struct Simulated {
     /// rms of the deviation from the log by actuator, rad or m; `None` for a model that cannot be
     /// simulated
     pub rms: [Option<Vec<f64>>; 3],
-    /// rms of the torque by which the controller answers the deviation, by actuator, N m or N
+    /// rms of the torque by which the controller answers the deviation, by actuator, N m or N; only under an
+    /// identified controller
     pub torque: [Option<Vec<f64>>; 3],
     /// times, s
     pub t: Vec<f64>,
@@ -141,7 +142,10 @@ pub fn forward(
             }
         }
         let rms = |x: &Vec<f64>| (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt();
-        let each = |x: &Vec<Vec<f64>>| (!x.is_empty()).then(|| x.iter().map(rms).collect());
+        let each = |x: &Vec<Vec<f64>>| {
+            let ran = x.first().is_some_and(|row| !row.is_empty());
+            ran.then(|| x.iter().map(rms).collect())
+        };
         out.records.push(Simulated {
             record: r.name.clone(),
             fit: r.fit,
@@ -168,26 +172,31 @@ struct Answer {
 }
 
 impl Answer {
-    /// Of an identified feedback, with the nominal mass matrix and the integral of the deviation.
-    fn of(f: &Feedback, d_a: &DMatrix<f64>, mass: &DMatrix<f64>, sum: &DVector<f64>) -> Self {
-        let of = |part: usize| match f.kind {
-            Acts::Actuators => {
-                let (na, m) = d_a.shape();
-                d_a.tr_mul(&DMatrix::from_fn(na, m, |j, c| {
-                    f.gains[j][part] * d_a[(j, c)]
-                }))
-            }
-            Acts::InverseDynamics => mass * f.gains[0][part],
+    /// Of a feedback of the actuators, with the integral of their deviation.
+    fn of_actuators(gains: &[[f64; 3]], d_a: &DMatrix<f64>, sum: &DVector<f64>) -> Self {
+        let (na, m) = d_a.shape();
+        let of = |part: usize| {
+            d_a.tr_mul(&DMatrix::from_fn(na, m, |j, c| {
+                gains[j][part] * d_a[(j, c)]
+            }))
         };
         Answer {
             stiff: of(0),
             damping: of(1),
-            slow: match f.kind {
-                Acts::Actuators => {
-                    d_a.tr_mul(&DVector::from_fn(sum.len(), |j, _| f.gains[j][2] * sum[j]))
-                }
-                Acts::InverseDynamics => of(2) * sum,
-            },
+            slow: d_a.tr_mul(&DVector::from_fn(na, |j, _| gains[j][2] * sum[j])),
+        }
+    }
+
+    /// Of inverse dynamics, with the nominal mass matrix and the integral of the coordinates' deviation.
+    fn of_inverse_dynamics(
+        [kp, kd, ki]: [f64; 3],
+        mass: &DMatrix<f64>,
+        sum: &DVector<f64>,
+    ) -> Self {
+        Answer {
+            stiff: mass * kp,
+            damping: mass * kd,
+            slow: mass * sum * ki,
         }
     }
 }
@@ -251,14 +260,17 @@ fn run(
                 damping: &terms.mass * (2.0 * omega),
                 slow: DVector::zeros(m),
             },
-            Some(f) => {
-                let mass = nominal.terms(&at(&r.x.q, i), &v)?.mass;
-                sum += match f.kind {
-                    Acts::Actuators => &moved * h,
-                    Acts::InverseDynamics => &e * h,
-                };
-                Answer::of(f, &terms.d_a, &mass, &sum)
-            }
+            Some(f) => match f.kind {
+                Acts::Actuators => {
+                    sum += &moved * h;
+                    Answer::of_actuators(&f.gains, &terms.d_a, &sum)
+                }
+                Acts::InverseDynamics => {
+                    sum += &e * h;
+                    let mass = nominal.terms(&at(&r.x.q, i), &v)?.mass;
+                    Answer::of_inverse_dynamics(f.gains[0], &mass, &sum)
+                }
+            },
         };
         let force = terms.d_a.tr_mul(&tau) - &terms.mass * &a - &stiff * &e - &slow - &terms.bias;
         let slope = terms
@@ -281,12 +293,12 @@ fn run(
             &coulomb,
         );
         ed = free - spread * friction;
-        let sent = actuation(&terms.d_a) * (&stiff * &e + &damping * &ed + &slow);
+        if held.is_some() {
+            let sent = actuation(&terms.d_a) * (&stiff * &e + &damping * &ed + &slow);
+            let each = torque.iter_mut().zip(sent.iter());
+            each.for_each(|(o, x)| o.push(*x));
+        }
         e += &ed * h;
-        torque
-            .iter_mut()
-            .zip(sent.iter())
-            .for_each(|(o, x)| o.push(*x));
         if !e.iter().all(|x| x.abs() < 10.0 * span) {
             return Err(Error::Infeasible(format!(
                 "the simulated robot leaves the recorded motion at {:.3} s",

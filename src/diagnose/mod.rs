@@ -348,12 +348,7 @@ pub fn of_logs(
     progress("noise and nominal model");
     let mut data = prepare(plant, raws)?;
     let effects = catalogue::all();
-    let close = {
-        let evidence = Evidence::new(&data, 1.0);
-        let phi = evidence.parameters(&[], &evidence.fit(&[]));
-        closeness::estimate(&evidence, &Context::new(&data, phi)?, &effects)
-    };
-    data.tighten(close);
+    closeness::tighten(&mut data, &effects)?;
     let data = data;
     let evidence = Evidence::new(&data, 1.0);
     let none = evidence.fit(&[]);

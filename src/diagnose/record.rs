@@ -168,16 +168,10 @@ impl Record {
                     / 12.0
             })
             .collect();
-        let (motion, position_noise, band) = match cycle {
-            Some(cycle) => periodic(&q, &steps, count, cycle, dt),
-            None => smooth(&q, &steps, count, dt),
-        };
+        let (motion, position_noise, band) = differentiated(&q, &steps, count, cycle, dt);
         let reference = raw.qref.as_ref().map(|columns| {
-            let (q, exact) = (grid(columns, stamped), vec![0.0; n]);
-            match cycle {
-                Some(cycle) => periodic(&q, &exact, count, cycle, dt).0,
-                None => smooth(&q, &exact, count, dt).0,
-            }
+            let exact = vec![0.0; n];
+            differentiated(&grid(columns, stamped), &exact, count, cycle, dt).0
         });
         let (x, actuators) = match plant.mechanism() {
             None => (motion.clone(), motion),
@@ -402,9 +396,21 @@ fn periodic(
 /// A signal limited to the band of the positions: the mean period up to [`BAND`] where the motion
 /// repeats, low-passed as they are otherwise.
 pub(super) fn limited(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
+    differentiated(x, &[0.0], x.len(), cycle, dt).0.q
+}
+
+/// Positions limited to a band, with their derivatives, noise and band: by Fourier series where the
+/// motion repeats, by a low-pass otherwise.
+fn differentiated(
+    q: &[f64],
+    steps: &[f64],
+    count: usize,
+    cycle: Option<usize>,
+    dt: f64,
+) -> (Samples, Vec<f64>, f64) {
     match cycle {
-        Some(cycle) => periodic(x, &[0.0], x.len(), cycle, dt).0.q,
-        None => smooth(x, &[0.0], x.len(), dt).0.q,
+        Some(cycle) => periodic(q, steps, count, cycle, dt),
+        None => smooth(q, steps, count, dt),
     }
 }
 

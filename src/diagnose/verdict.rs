@@ -267,7 +267,6 @@ impl State<'_> {
         set: &[Candidate],
         candidate: Candidate,
         first: bool,
-        total: f64,
     ) -> Option<Vec<Candidate>> {
         let mut grown = set.to_vec();
         grown.push(candidate);
@@ -281,7 +280,7 @@ impl State<'_> {
             let gain = |s: &[Candidate]| self.gain(s);
             self.polish(&mut pair);
             let each = |i: usize| accepted(self, &pair, i);
-            if gain(&pair) > gain(&grown) + 0.01 * total && (0..2).all(each) {
+            if gain(&pair) > gain(&grown) + 0.01 * self.total && (0..2).all(each) {
                 return Some(pair);
             }
         }
@@ -413,8 +412,7 @@ pub fn decide(
     // no more than a part of a gap that is small itself
     let largest = before.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
     st.floor = FLOOR.min(0.3 * largest);
-    let total = st.above(&before, true);
-    st.total = total;
+    st.total = st.above(&before, true);
     let visible = before.iter().any(|v| *v > SOUND * rows);
     let surprising = surprise > SURPRISE + 2.0 * free;
     let mut set: Vec<Candidate> = Vec::new();
@@ -432,7 +430,7 @@ pub fn decide(
         // one that gains most need not be one that holds: the others have their turn
         let tried = next.into_iter().take(5).enumerate();
         let grown = tried
-            .filter_map(|(i, candidate)| st.grown(list, &set, candidate, i == 0, total))
+            .filter_map(|(i, candidate)| st.grown(list, &set, candidate, i == 0))
             .next();
         match grown {
             Some(grown) => set = grown,
@@ -490,7 +488,7 @@ pub fn decide(
     let whole = |fit: bool| st.above(&st.gap(&evidence.r, fit), fit);
     let [base, base_held] = match hides {
         true => [whole(true), whole(false)],
-        false => [total, st.above(&hold_before, false)],
+        false => [st.total, st.above(&hold_before, false)],
     };
     let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
     // a set that cannot be told apart explains as well as its one right member
@@ -620,7 +618,8 @@ fn judge(
     // what an effect explains of the residual may be too little to judge it by, although its parameters
     // stand out
     let in_rows = logistic((chi_gain / rows - LEAST) / 0.02);
-    let faint = in_rows * st.matters(c, &without, after) < 0.5;
+    let matters = st.matters(c, &without, after);
+    let faint = in_rows * matters < 0.5;
     let frozen = st.may_hide(set, i)
         && fall > SURPRISE
         && (faint || chi_gain < (0.5 * gain).max(1.5 * LEAST * rows));
@@ -735,10 +734,6 @@ fn judge(
     } else {
         (hold_all(&r0) - hold_all(&r1)) / hold_total.max(1e-9)
     };
-    let matters = match frozen {
-        true => 1.0,
-        false => st.matters(c, &without, after),
-    };
     let predicted = match frozen || st.remembers(c) {
         true => 1.0,
         false => predicts(data, &r0, &r1),
@@ -755,7 +750,7 @@ fn judge(
     let together = size
         * shown_on_both(data, c, &r0, &r1)
         * unsteady.map_or(1.0, |u| logistic((UNSTEADY - u) / 0.02))
-        * matters
+        * if frozen { 1.0 } else { matters }
         * logistic((predicted - HELD) / 0.05)
         * decoys.map_or(1.0, |d| logistic((DECOY - d) / 0.03))
         * match frozen {
@@ -788,14 +783,18 @@ fn predicts(data: &Data, r0: &[Vec<f64>], r1: &[Vec<f64>]) -> f64 {
         return 1.0;
     }
     let nothing = 0.02 * rows.len() as f64;
-    let taken: f64 = r0
-        .iter()
-        .zip(r1)
+    let [taken, fall] = taken_and_fall(r0, r1, rows);
+    (fall + nothing) / (taken + nothing)
+}
+
+/// `‖Δ‖²` of what a fit takes away, `Δ = r₀ − r₁`, and by how much the residual falls, on some rows of actuators.
+fn taken_and_fall(r0: &[Vec<f64>], r1: &[Vec<f64>], rows: Range<usize>) -> [f64; 2] {
+    let pairs = r0.iter().zip(r1);
+    let taken = pairs
         .flat_map(|(a, b)| a[rows.clone()].iter().zip(&b[rows.clone()]))
         .map(|(a, b)| (a - b) * (a - b))
         .sum();
-    let fall = energy(r0, rows.clone()) - energy(r1, rows);
-    (fall + nothing) / (taken + nothing)
+    [taken, energy(r0, rows.clone()) - energy(r1, rows)]
 }
 
 /// What an effect gains from coefficients of its own in every fitted record, beyond what so many freedoms gain
@@ -845,10 +844,7 @@ fn shown_on_both(data: &Data, c: &Candidate, r0: &[Vec<f64>], r1: &[Vec<f64>]) -
         return 1.0;
     }
     let on = |j: usize| -> f64 {
-        let rows = |e: &[Vec<f64>]| e[j][..data.fitted].to_vec();
-        let (a, b) = (rows(r0), rows(r1));
-        let taken: f64 = a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum();
-        let fall: f64 = a.iter().zip(&b).map(|(a, b)| a * a - b * b).sum();
+        let [taken, fall] = taken_and_fall(&r0[j..=j], &r1[j..=j], 0..data.fitted);
         match taken < UNSEEN {
             true => 0.3,
             false => logistic((fall / taken - HELD) / 0.05),
