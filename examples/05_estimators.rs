@@ -4,7 +4,7 @@
 //! `cargo run --release --example 05_estimators [RUNS]`, 20 runs a row
 
 use excite::dynamics::Samples;
-use excite::estimate::{Consistency, Method, Settings, identify};
+use excite::identify::{Consistency, Method, Settings, identify};
 use excite::log::{Payload, Purpose, Record};
 use excite::robot::JointTerm;
 use excite::{Plant, Robot};

@@ -5,7 +5,7 @@
 //! `cargo run --release --example 07_h4_identification`
 
 use excite::design::{Condition, Settings as Design, design_plant};
-use excite::estimate::{Settings, identify};
+use excite::identify::{Settings, identify};
 use excite::log::{Purpose, Record};
 use excite::mechanism::{Mechanism, bundled};
 use excite::simulate::record::{Sensors, measure, to_record};

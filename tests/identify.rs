@@ -1,6 +1,6 @@
 //! Identification: exact without noise, honest with it, possible always, and right on real robots.
 
-use excite::estimate::{Consistency, Identification, Method, Settings, identify, robot};
+use excite::identify::{Consistency, Identification, Method, Settings, identify, robot};
 use excite::log::{Experiment, Payload, Purpose, Record};
 use excite::robot::JointTerm;
 use excite::{Plant, Robot};

@@ -396,7 +396,7 @@ fn payload_of_a_serial_robot() {
         (v[0] - 3.0).abs() < 1e-8 && (v[3] - 0.1).abs() < 1e-8,
         "{v:?}"
     );
-    let json = excite::load::report::json(&found);
+    let json = excite::load::json::json(&found);
     assert!(json["inertia_com"]["value"][0].is_null() && json["mass"]["value"].is_number());
 }
 
@@ -484,7 +484,7 @@ fn robots_with_few_axes_say_what_they_cannot_tell() {
             .iter()
             .any(|w| w.message.contains("cannot tell"))
     );
-    let page = excite::load::report::html(&found);
+    let page = excite::load::page::html(&found);
     assert!(page.contains("not identifiable"));
 }
 

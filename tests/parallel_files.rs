@@ -508,7 +508,7 @@ fn motions_that_the_platform_cannot_do_are_refused() {
 /// Other values written to a robot file are the values that are read from it.
 #[test]
 fn an_identified_mechanism_is_written_and_read() {
-    use excite::estimate::{mechanism, robot};
+    use excite::identify::{mechanism, robot};
     use rand::Rng;
     let [hexapod, h4, delta] = ["hexapod", "h4", "delta"].map(|n| bundled::find(n).unwrap().toml);
     let terms = "identify = [\"armature\", \"viscous\", \"coulomb\", \"offset\"]";

@@ -3,8 +3,9 @@
 use excite::Robot;
 use excite::design::record::{Record, Start, Status};
 use excite::design::settings::Settings;
+use excite::identifiability::json::json;
+use excite::identifiability::page::{Grade, html, verdict};
 use excite::identifiability::{Assessment, Excitation};
-use excite::report::before::{Grade, html, json, verdict};
 use excite::robot::{JointTerm, bundled};
 use excite::trajectory::{Basis, Ends, Fourier, Grid, Trajectory, certify};
 use rand::{Rng, SeedableRng};

@@ -7,8 +7,8 @@ use excite::design::diagnostic::PERIODS;
 use excite::design::{Condition, Criterion, Progress, Settings, design_plant};
 use excite::dynamics::Tree;
 use excite::identifiability::Assessment;
+use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;
-use excite::report::before;
 use excite::trajectory::samples::write_samples;
 use excite::trajectory::{Ends, Grid, Space, Trajectory};
 use excite::{Error, Plant, Result};
@@ -191,7 +191,7 @@ pub fn run(args: Args) -> Result<()> {
         false => diagnostic::Set::default(),
     };
     set.write(&plant, &args.robot, &args.output, args.force, args.rate)?;
-    let mut json = before::json(
+    let mut json = json(
         &assessment,
         Some(&result.record),
         begin.elapsed().as_secs_f64(),
@@ -203,7 +203,7 @@ pub fn run(args: Args) -> Result<()> {
     write(
         &files[3],
         args.force,
-        &before::html(&assessment, Some(&result.record)),
+        &page::html(&assessment, Some(&result.record)),
     )?;
     match args.json {
         true => print(&pretty(&json)),

@@ -2,7 +2,7 @@
 
 use super::{pretty, print, warn, write};
 use excite::diagnose::{Settings, diagnose, improve, json, page};
-use excite::estimate::robot::urdf;
+use excite::identify::robot::urdf;
 use excite::log::Experiment;
 use excite::output::prepare_dir;
 use excite::report::format::{percent, significant};

@@ -2,8 +2,8 @@
 
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::identifiability::Assessment;
+use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;
-use excite::report::before;
 use excite::trajectory::Trajectory;
 use excite::{Error, Result};
 use std::path::PathBuf;
@@ -57,9 +57,9 @@ pub fn run(args: Args) -> Result<()> {
         None => Assessment::of_plant(&plant)?,
     };
     warn(&assessment.warnings);
-    let json = before::json(&assessment, None, begin.elapsed().as_secs_f64());
+    let json = json(&assessment, None, begin.elapsed().as_secs_f64());
     write(&files[0], args.force, &pretty(&json))?;
-    write(&files[1], args.force, &before::html(&assessment, None))?;
+    write(&files[1], args.force, &page::html(&assessment, None))?;
     match args.json {
         true => print(&pretty(&json)),
         false => print(&summary(&assessment, None, &files)),

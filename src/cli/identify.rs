@@ -1,12 +1,12 @@
 //! `excite identify EXPERIMENT`.
 
 use super::{pretty, print, warn, write};
-use excite::estimate::{
+use excite::identify::page;
+use excite::identify::{
     Consistency, Identification, Method, Settings, identify, json, mechanism, robot,
 };
 use excite::log::Experiment;
 use excite::output::prepare_dir;
-use excite::report::after;
 use excite::robot::JointTerm;
 use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write as _;
@@ -121,7 +121,7 @@ pub fn run(args: Args) -> Result<()> {
         id.warnings.push(Warning::new("robot.toml", message));
     }
     warn(&id.warnings);
-    let (_, verdict) = after::verdict(plant, &id);
+    let (_, verdict) = page::verdict(plant, &id);
     let report = json::report(
         plant,
         &id,
@@ -133,7 +133,7 @@ pub fn run(args: Args) -> Result<()> {
         ("model.json", pretty(&json::model(plant, &id))),
         ("robot.urdf", robot::urdf(&robot)),
         ("report.json", pretty(&report)),
-        ("report.html", after::html(plant, &id, &settings)),
+        ("report.html", page::html(plant, &id, &settings)),
     ];
     if serial {
         texts.push(("robot.xml", robot::mujoco(&robot)));

@@ -116,9 +116,9 @@ pub fn run(args: Args) -> Result<()> {
     let files = prepare_dir(&args.output, &["load.json", "report.html"], args.force)?;
     let found = load::identify(&experiment, &settings)?;
     warn(&found.warnings);
-    let json = load::report::json(&found);
+    let json = load::json::json(&found);
     write(&files[0], args.force, &pretty(&json))?;
-    write(&files[1], args.force, &load::report::html(&found))?;
+    write(&files[1], args.force, &load::page::html(&found))?;
     match args.json {
         true => print(&pretty(&json)),
         false => print(&summary(&found, &files)),

@@ -27,6 +27,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
+/// Natural frequency of the spring that holds the robot to the recorded motion where its own controller is not
+/// known, Hz.
+pub const BANDWIDTH: f64 = 2.0;
 /// A gain must be this many of its standard deviations.
 const CERTAIN: f64 = 6.0;
 /// Most that the controller may leave of the torque (rms over rms).
@@ -79,7 +82,7 @@ pub fn identify(data: &Data, phi: &[f64]) -> Result<Feedback, String> {
         .copied()
         .filter(|j| !each[*j].certain)
         .collect();
-    let omega = TAU * super::forward::BANDWIDTH;
+    let omega = TAU * BANDWIDTH;
     let gains = |(j, f): (usize, &Fitted)| match f.certain {
         true => f.gains,
         false => [

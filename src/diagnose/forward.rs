@@ -4,7 +4,7 @@
 //! Where the log holds commanded positions, the simulated robot is under the **same commands**: its
 //! controller sends what was recorded, less the feedback of the deviation ([`controller`](super::controller)).
 //! Otherwise the recorded torque drives it; as every model drifts away on torque alone, a soft spring
-//! and damper of natural frequency `ω` ([`BANDWIDTH`]) and ratio 1 hold it to the recorded motion
+//! and damper of natural frequency `ω` ([`BANDWIDTH`](super::controller::BANDWIDTH)) and ratio 1 hold it to the recorded motion
 //! `x_m`. With the deviation `e = x − x_m`, friction `λ` and the torque `τ_e` of the effects:
 //!
 //! ```text
@@ -28,7 +28,7 @@ use super::data::Data;
 use super::record::Record;
 use super::verdict::Member;
 use crate::error::{Error, Result};
-use crate::estimate::robot::with_values;
+use crate::identify::robot::with_values;
 use crate::report::format::unit_of;
 use crate::robot::Robot;
 use crate::simulate::Dynamics;
@@ -39,8 +39,6 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Natural frequency of the spring that holds the robot to the recorded motion, Hz.
-pub const BANDWIDTH: f64 = 2.0;
 /// Longest part of a record that is simulated, s.
 pub const LONGEST: f64 = 20.0;
 /// The models, in the order of every array of three.
@@ -220,7 +218,7 @@ fn run(
     let coulomb: Vec<f64> = dry.iter().map(|j| robot.joints[*j].terms[2]).collect();
     let slack: Vec<f64> = coulomb.iter().map(|f| -f).collect();
 
-    let (h, omega) = (r.dt, TAU * BANDWIDTH);
+    let (h, omega) = (r.dt, TAU * super::controller::BANDWIDTH);
     let at = |rows: &[f64], i: usize| DVector::from_fn(m, |c, _| rows[c * r.count + i]);
     let span = (0..m)
         .map(|c| {

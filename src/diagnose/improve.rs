@@ -1,7 +1,7 @@
 //! The model with what was found: `robot.toml`, URDF and MuJoCo terms.
 
 use super::Diagnosis;
-use crate::estimate::robot as files;
+use crate::identify::robot as files;
 use crate::plant::Plant;
 use crate::robot::Robot;
 use std::fmt::Write;

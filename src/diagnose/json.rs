@@ -1,6 +1,7 @@
 //! `diagnosis.json`.
 
-use super::forward::{BANDWIDTH, MODELS};
+use super::controller::BANDWIDTH;
+use super::forward::MODELS;
 use super::{Diagnosis, Finding};
 use serde_json::{Map, Value, json};
 

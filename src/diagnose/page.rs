@@ -557,7 +557,7 @@ fn driven(d: &Diagnosis) -> Markup {
         }
         held => html! {
             "The recorded torque drives the simulated robot, and a soft spring and damper of "
-            (significant(super::forward::BANDWIDTH, 2)) " Hz hold it, for no model stays on a path that is driven by torque alone; so the \
+            (significant(super::controller::BANDWIDTH, 2)) " Hz hold it, for no model stays on a path that is driven by torque alone; so the \
              figures compare models, and are no tracking errors under the robot's own controller"
             @if let Some(Err(why)) = held { ": " (why) } "."
         },

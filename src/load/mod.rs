@@ -31,8 +31,9 @@
 
 pub mod body;
 pub mod gain;
+pub mod json;
 pub mod one_step;
-pub mod report;
+pub mod page;
 pub mod system;
 pub mod two_step;
 pub mod weight;

@@ -4,8 +4,6 @@
 //! [`plot`]. Nothing in a report depends on the time or the machine, so the same input gives the
 //! same bytes; nothing is fetched from anywhere, so a report can be stored and sent as it is.
 
-pub mod after;
-pub mod before;
 pub mod format;
 pub mod html;
 pub mod plot;

@@ -20,7 +20,7 @@ pub mod torque;
 pub mod transition;
 
 pub use basis::{Basis, Ends};
-pub use certificate::{Certificate, certify};
+pub use certificate::{Certificate, TorqueBound, certify};
 pub use extrema::{Extrema, Extremum, extrema};
 pub use extrema_fast::extrema_fast;
 pub use file::{Space, Trajectory};
@@ -28,4 +28,4 @@ pub use fourier::{Fourier, Series};
 pub use grid::Grid;
 pub use samples::Samples;
 pub use table::{Sampled, Table};
-pub use torque::{TorqueBound, torque_certificate};
+pub use torque::torque_certificate;

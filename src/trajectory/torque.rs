@@ -1,6 +1,6 @@
 //! Torque over all time: samples, and a proof of what happens between them.
 
-use super::certificate::{TOLERANCE, check};
+use super::certificate::{TorqueBound, check};
 use super::fourier::Fourier;
 use super::jets::{Jet, Norms};
 use crate::error::{Error, Result};
@@ -8,47 +8,6 @@ use crate::robot::{JointTerm, Robot};
 
 /// What may be missing between samples, as a fraction of the effort limit.
 const TARGET: f64 = 0.002;
-
-/// The largest torque of one joint over all time, against its limit.
-///
-/// At no time is the magnitude of the torque larger than [`TorqueBound::bound`]
-/// `= max_on_grid + between_grid_bound + coulomb`.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct TorqueBound {
-    /// name of the joint
-    pub joint: String,
-    /// largest magnitude of the smooth torque at a sample, N m or N
-    pub max_on_grid: f64,
-    /// when, s into the period
-    pub time: f64,
-    /// the smooth torque exceeds `max_on_grid` by no more than this between samples (rigorous)
-    pub between_grid_bound: f64,
-    /// Coulomb friction, counted as `±F_c` at all times
-    pub coulomb: f64,
-    /// samples taken
-    pub samples: usize,
-    /// effort limit; `None` where there is none
-    pub limit: Option<f64>,
-    /// `(max_on_grid + coulomb) / limit`
-    pub used: Option<f64>,
-    /// `limit − max_on_grid − coulomb`
-    pub margin: Option<f64>,
-}
-
-impl TorqueBound {
-    /// The magnitude of the torque is larger than this at no time.
-    pub fn bound(&self) -> f64 {
-        self.max_on_grid + self.between_grid_bound + self.coulomb
-    }
-
-    /// Whether the bound stays within the limit.
-    pub fn satisfied(&self) -> bool {
-        match self.limit {
-            Some(limit) => self.bound() <= limit * (1.0 + TOLERANCE),
-            None => self.bound().is_finite(),
-        }
-    }
-}
 
 /// The smooth part of the torque (rigid bodies, armature, viscous friction, offset) at one state:
 /// `(q, qd, qdd, tau)` with `tau` to be written.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::dynamics::Tree;
-use crate::estimate::robot::with_values;
+use crate::identify::robot::with_values;
 use crate::mechanism::Mechanism;
 use nalgebra::Vector3;
 

@@ -1,9 +1,9 @@
 //! What is needed to get the same again.
 
-use super::super::html::Section;
 use crate::design::record::Record;
 use crate::design::settings::Settings;
 use crate::identifiability::Assessment;
+use crate::report::html::Section;
 use crate::trajectory::Space;
 use maud::html;
 
@@ -67,7 +67,7 @@ fn settings(a: &Assessment, record: Option<&Record>) -> Option<String> {
 }
 
 /// Seed of the design, where it is known.
-pub(super) fn seed(a: &Assessment, record: Option<&Record>) -> Option<u64> {
+pub(in crate::identifiability) fn seed(a: &Assessment, record: Option<&Record>) -> Option<u64> {
     record.map(|r| r.settings.seed).or_else(|| {
         let stored = &a.excitation.as_ref()?.trajectory.settings;
         stored.get("seed")?.as_u64()

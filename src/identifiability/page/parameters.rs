@@ -1,10 +1,10 @@
 //! What will be known: predicted uncertainty of the base parameters, classes of the standard ones.
 
-use super::super::format::{NBSP, count, significant, unit};
-use super::super::html::{self, Section};
 use super::KNOWN;
 use crate::base::{Identifiability, StandardParameter};
 use crate::identifiability::{Assessment, Excitation, Prediction, RATE};
+use crate::report::format::{NBSP, count, significant, unit};
+use crate::report::html::{self, Section};
 use crate::robot::{JointTerm, Motion, inertia};
 use maud::{Markup, html};
 

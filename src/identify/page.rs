@@ -1,12 +1,12 @@
 //! The report after the run: what the records say about the model.
 
-use super::format::{NBSP, percent, significant, unit, with_unit};
-use super::html::{self, Section, Tone};
-use super::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape, time_series};
-use crate::estimate::validation::Trace;
-use crate::estimate::{Consistency, Identification, Settings};
+use crate::identify::validation::Trace;
+use crate::identify::{Consistency, Identification, Settings};
 use crate::log::Purpose;
 use crate::plant::{Kind, Plant};
+use crate::report::format::{NBSP, percent, significant, unit, with_unit};
+use crate::report::html::{self, Section, Tone};
+use crate::report::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape, time_series};
 use crate::robot::Motion;
 use crate::signals::fourier::welch;
 use maud::{Markup, html};

@@ -12,6 +12,8 @@
 //! diagonal gives the predicted standard deviation of every base parameter.
 
 mod closed;
+pub mod json;
+pub mod page;
 
 use crate::base::BaseParameters;
 use crate::dynamics::{Samples, Tree};

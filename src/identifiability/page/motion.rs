@@ -1,10 +1,10 @@
 //! The motion against its limits: curves, certified extrema, and how much of each limit is used.
 
-use super::super::format::{percent, significant, unit_of};
-use super::super::html::{self, Section};
-use super::super::plot::{self, Axis, Bar, Colour, Marker, Panel, Series, Shape};
 use super::verdict::violations;
 use crate::identifiability::{Excitation, Platform, RATE};
+use crate::report::format::{percent, significant, unit_of};
+use crate::report::html::{self, Section};
+use crate::report::plot::{self, Axis, Bar, Colour, Marker, Panel, Series, Shape};
 use crate::robot::{Motion, Robot};
 use crate::trajectory::Space;
 use crate::trajectory::certificate::{Kind, Peak};

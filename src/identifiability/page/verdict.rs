@@ -1,9 +1,9 @@
 //! The verdict in a sentence, built from the facts.
 
-use super::super::format::{count, percent, significant, unit_of, with_unit};
 use super::{KNOWN, parameters};
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::mechanism::PoseKind;
+use crate::report::format::{count, percent, significant, unit_of, with_unit};
 use crate::robot::{Motion, Robot};
 use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
 
@@ -125,7 +125,7 @@ pub fn verdict(a: &Assessment) -> Verdict {
 }
 
 /// Every limit that does not hold or is not proven to, in words, the furthest beyond first.
-pub(super) fn violations(robot: &Robot, e: &Excitation) -> Vec<String> {
+pub(in crate::identifiability) fn violations(robot: &Robot, e: &Excitation) -> Vec<String> {
     let mut all: Vec<(f64, String)> = Vec::new();
     for (joint, c) in robot.joints.iter().zip(&e.certificate.joints) {
         position(joint.motion, c, &mut all);

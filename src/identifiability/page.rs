@@ -2,21 +2,19 @@
 //!
 //! The same report stands for a robot alone; what needs a trajectory is then left out.
 
-mod json;
 mod motion;
 mod parameters;
 mod platform;
-mod reproduce;
+pub(super) mod reproduce;
 mod spectrum;
-mod verdict;
+pub(super) mod verdict;
 
-pub use json::json;
 pub use verdict::{Grade, Verdict, verdict};
 
-use super::format::{count, percent, significant, with_unit};
-use super::html::{self, Section, Tone};
 use crate::design::record::Record;
 use crate::identifiability::Assessment;
+use crate::report::format::{count, percent, significant, with_unit};
+use crate::report::html::{self, Section, Tone};
 use maud::{Markup, html};
 
 /// A parameter counts as known from this relative standard deviation downwards, percent.

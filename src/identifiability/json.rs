@@ -1,7 +1,7 @@
 //! `report.json` of `design` and `identifiability`.
 
-use super::reproduce::seed;
-use super::verdict::{verdict, violations};
+use super::page::reproduce::seed;
+use super::page::verdict::{verdict, violations};
 use crate::design::record::Record;
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::trajectory::Space;

@@ -1,12 +1,12 @@
 //! Singular values and the course of the design.
 
-use super::super::format::{count, significant};
-use super::super::html::{self, Section};
-use super::super::plot::{self, Colour, Figure, Panel, Shape};
 use crate::design::criterion::{Condition, Criterion};
 use crate::design::record::{Record, Status};
 use crate::design::settings::Settings;
 use crate::identifiability::Assessment;
+use crate::report::format::{count, significant};
+use crate::report::html::{self, Section};
+use crate::report::plot::{self, Colour, Figure, Panel, Shape};
 use maud::{Markup, html};
 
 /// Most starts that are drawn.

@@ -1,12 +1,12 @@
 //! The platform of a parallel robot: its path, the mechanism in its extreme poses, passive joints
 //! and distance from singularities.
 
-use super::super::format::{percent, significant};
-use super::super::html::{self, Section};
-use super::super::plot::wireframes;
-use super::super::plot::{self, Axis, Colour, Drawing, Figure, Line, Panel, Rule, Series, Shape};
 use crate::identifiability::{Excitation, Platform};
 use crate::mechanism::PoseKind;
+use crate::report::format::{percent, significant};
+use crate::report::html::{self, Section};
+use crate::report::plot::wireframes;
+use crate::report::plot::{self, Axis, Colour, Drawing, Figure, Line, Panel, Rule, Series, Shape};
 use crate::trajectory::certificate::Peak;
 use maud::{Markup, html};
 

@@ -20,6 +20,7 @@ pub mod json;
 pub mod linear;
 pub mod lmi;
 pub mod mechanism;
+pub mod page;
 pub mod robot;
 pub mod stack;
 pub mod standstill;
