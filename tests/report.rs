@@ -137,7 +137,14 @@ fn a_good_trajectory_is_reported_in_full() {
     stands_alone(&page);
     let v = verdict(&a);
     assert!(matches!(v.grade, Grade::Worthwhile | Grade::Weak));
-    assert!(v.text.starts_with("Safe to run"), "{}", v.text);
+    assert!(v.text.starts_with("Inside its limits"), "{}", v.text);
+    assert!(
+        v.text.contains(
+            "Collisions of the robot with itself and with its surroundings were not checked"
+        ),
+        "{}",
+        v.text
+    );
     assert!(v.text.contains("43\u{a0}base parameters"), "{}", v.text);
     assert!(page.contains(&v.text));
     let e = a.excitation.as_ref().expect("a trajectory");

@@ -1,4 +1,4 @@
-//! The report before the run: is this trajectory safe, and worth running?
+//! The report before the run: is this trajectory inside the limits, and worth running?
 //!
 //! The same report stands for a robot alone; what needs a trajectory is then left out.
 

@@ -10,6 +10,10 @@ use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
 /// Condition number from which a trajectory does not excite every base parameter.
 const UNEXCITED: f64 = 1e7;
 
+/// What no verdict may leave out: the limits say nothing of collisions.
+const UNCHECKED: &str =
+    "Collisions of the robot with itself and with its surroundings were not checked.";
+
 /// The verdict in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -88,8 +92,8 @@ pub fn verdict(a: &Assessment) -> Verdict {
         return Verdict {
             grade: Grade::Unexciting,
             text: format!(
-                "Safe to run, but not every parameter is excited: {limits}, yet the motion does \
-                 not tell all {} apart (condition number {}).",
+                "Inside its limits, but not every parameter is excited: {limits}, yet the motion \
+                 cannot separate all {} (condition number {}). {UNCHECKED}",
                 count(b, "base parameter"),
                 significant(condition, 2)
             ),
@@ -114,12 +118,14 @@ pub fn verdict(a: &Assessment) -> Verdict {
     if 2 * known >= judged {
         Verdict {
             grade: Grade::Worthwhile,
-            text: format!("Safe to run and worth running: {facts}."),
+            text: format!("Inside its limits and worth running: {facts}. {UNCHECKED}"),
         }
     } else {
         Verdict {
             grade: Grade::Weak,
-            text: format!("Safe to run, but it tells little: {facts}."),
+            text: format!(
+                "Inside its limits, but most parameters stay uncertain: {facts}. {UNCHECKED}"
+            ),
         }
     }
 }
