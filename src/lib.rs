@@ -37,8 +37,14 @@
 //! | base | [`base`] | base parameters, rank, what cannot be identified and why |
 //! | trajectory | [`trajectory`] | Fourier series, exact extrema, certificates, files |
 //! | design | [`design`] | the optimiser |
+//! | before the run | [`identifiability`] | which parameters the run will identify, and how well |
+//! | rehearsal | [`simulate`] | a log as the robot would write it |
 //! | log | [`log`], [`signals`] | what was recorded, repaired, filtered, differentiated |
-//! | report | [`identifiability`], [`report`] | what the run will tell, as JSON and HTML |
+//! | identify | [`identify`] | parameters with their uncertainty, validated on other records |
+//! | load | [`load`] | mass, centre of mass and inertia of what the robot carries |
+//! | diagnose | [`diagnose`] | which effect the model lacks, and how far the gap shrinks with it |
+//! | report | [`report`] | pages, tables and plots of all stages |
+//! | documents | [`documentation`] | method, notation, files: the folder `docs/` |
 //!
 //! | symbol | meaning |
 //! |---|---|
@@ -48,14 +54,15 @@
 //! | `Y`, `W` | regressor of one sample, stacked regressor |
 //! | `pi_b` | base parameters |
 //!
-//! SI units everywhere. All conventions are in `docs/notation.md`, the method with its equations in
-//! `docs/method.md`.
+//! SI units everywhere. All conventions are in [`documentation::notation`], the method with its
+//! equations in [`documentation::method`].
 #![warn(missing_docs)]
 
 pub mod base;
 pub mod conic;
 pub mod design;
 pub mod diagnose;
+pub mod documentation;
 pub mod dynamics;
 pub mod error;
 pub mod identifiability;

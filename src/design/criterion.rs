@@ -147,11 +147,9 @@ impl Objective {
         }
     }
 
-    /// Value and gradient of the criterion with its extreme eigenvalues smoothed by p-norms,
-    /// `λ_1 ≈ (Σ λ^p)^{1/p}`, `1/λ_r ≈ (Σ λ^{-p})^{1/p}`; D and A as they are.
-    ///
-    /// # Errors
-    /// As [`Objective::spectrum`].
+    /// The criterion with its extreme eigenvalues smoothed by p-norms,
+    /// `λ_1 ≈ (Σ λ^p)^{1/p}`, `1/λ_r ≈ (Σ λ^{-p})^{1/p}`; D and A as they are. Infinite where
+    /// the information matrix is singular.
     pub fn smooth_value(&self, s: &Spectrum, p: f64) -> f64 {
         let l = &s.values;
         let (low, high) = (l[0], l[l.len() - 1]);

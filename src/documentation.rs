@@ -1,0 +1,59 @@
+//! The documents of the folder `docs/`.
+//!
+//! | document | what it says |
+//! |---|---|
+//! | [`formats`] | every file that is read or written, every key |
+//! | [`notation`] | symbols, units, frames, signs |
+//! | [`method`] | robot, regressor, base parameters, design: the equations |
+//! | [`parallel`] | parallel robots |
+//! | [`identification`] | from a log to a model |
+//! | [`load`] | mass, centre of mass and inertia of a load |
+//! | [`simulation`] | the simulated robot |
+//! | [`diagnosis`] | how to read a diagnosis, and what to do next |
+//! | [`limits`] | what is not known, not proven, or not there |
+//! | [`withheld`] | how often the diagnosis is right |
+//! | [`results`], [`benchmarks`] | what was measured, and how to measure it again |
+//! | [`design`], [`compare`] | why it is as it is; other tools |
+
+/// A module that holds one document. The documents link to one another by file name, which the
+/// definitions in front of the text turn into links between these modules.
+macro_rules! documents {
+    ($($name:ident $file:literal)*) => {
+        $(
+            #[doc = "[benchmarks.md]: crate::documentation::benchmarks"]
+            #[doc = "[compare.md]: crate::documentation::compare"]
+            #[doc = "[design.md]: crate::documentation::design"]
+            #[doc = "[diagnosis.md]: crate::documentation::diagnosis"]
+            #[doc = "[formats.md]: crate::documentation::formats"]
+            #[doc = "[identification.md]: crate::documentation::identification"]
+            #[doc = "[limits.md]: crate::documentation::limits"]
+            #[doc = "[load.md]: crate::documentation::load"]
+            #[doc = "[method.md]: crate::documentation::method"]
+            #[doc = "[notation.md]: crate::documentation::notation"]
+            #[doc = "[parallel.md]: crate::documentation::parallel"]
+            #[doc = "[results.md]: crate::documentation::results"]
+            #[doc = "[simulation.md]: crate::documentation::simulation"]
+            #[doc = "[withheld.md]: crate::documentation::withheld"]
+            #[doc = ""]
+            #[doc = include_str!(concat!("../docs/", $file, ".md"))]
+            pub mod $name {}
+        )*
+    };
+}
+
+documents! {
+    benchmarks "benchmarks"
+    compare "compare"
+    design "design"
+    diagnosis "diagnosis"
+    formats "formats"
+    identification "identification"
+    limits "limits"
+    load "load"
+    method "method"
+    notation "notation"
+    parallel "parallel"
+    results "results"
+    simulation "simulation"
+    withheld "withheld"
+}
