@@ -325,7 +325,7 @@ fn a_real_axis_has_asymmetric_friction_and_more() {
 
 #[test]
 fn a_withheld_set() {
-    // one case of each kind; the whole set is scored by `cargo run --example withheld`
+    // one case of each kind; the whole set is scored by `cargo run -p withheld`
     let Some(clean) = of_folder("withheld-dev/case_014") else {
         return;
     };

@@ -1,11 +1,11 @@
 //! Runs the diagnosis as its user does, on robot file and logs alone, and only then opens the answers.
 
-use crate::score::{self, Judged};
-use crate::table;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
+use withheld::score::{self, Judged};
+use withheld::table;
 
 #[derive(clap::Args)]
 pub struct Options {
@@ -20,16 +20,13 @@ pub struct Options {
     keep: bool,
 }
 
-/// The program beside the example's own folder: `target/release/excite`.
+/// The program beside this one: `target/release/excite`.
 fn program(options: &Options) -> Result<PathBuf, String> {
     if let Some(p) = &options.excite {
         return Ok(p.clone());
     }
     let own = std::env::current_exe().map_err(|e| e.to_string())?;
-    let near = own
-        .parent()
-        .and_then(Path::parent)
-        .map(|d| d.join("excite"));
+    let near = own.parent().map(|d| d.join("excite"));
     near.filter(|p| p.exists()).ok_or_else(|| {
         "no `excite` beside this program; build it (cargo build --release) or name it by --excite".into()
     })

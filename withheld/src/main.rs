@@ -1,28 +1,13 @@
 //! The check of the diagnosis on withheld effects; see `docs/withheld.md`.
 //!
-//! `cargo run --release --example withheld -- check --seed 1 --cases 60 --output target/withheld`
+//! `cargo run --release -p withheld -- check --seed 1 --cases 60 --output target/withheld`
 
-mod attach;
-mod case;
-mod chain;
-mod disturb;
-mod effects;
-mod friction;
-mod motion;
-mod plan;
-mod plant;
-mod random;
-mod refit;
-mod robots;
 mod run;
-mod score;
-mod simulate;
-mod table;
-mod write;
 
 use clap::{Args, Parser, Subcommand};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use withheld::{case, effects, plan, write};
 
 #[derive(Parser)]
 #[command(about = "Check the diagnosis on robots whose effect is withheld")]

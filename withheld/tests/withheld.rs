@@ -1,47 +1,13 @@
-//! The generator of withheld effects (`examples/withheld`): its physics, its agreement with the
+//! The generator of withheld effects (`withheld/`): its physics, its agreement with the
 //! library that it does not call, its files, and the scorer.
 
-#![allow(dead_code)]
-
-#[path = "../examples/withheld/attach.rs"]
-mod attach;
-#[path = "../examples/withheld/case.rs"]
-mod case;
-#[path = "../examples/withheld/chain.rs"]
-mod chain;
-#[path = "../examples/withheld/disturb.rs"]
-mod disturb;
-#[path = "../examples/withheld/effects.rs"]
-mod effects;
-#[path = "../examples/withheld/friction.rs"]
-mod friction;
-#[path = "../examples/withheld/motion.rs"]
-mod motion;
-#[path = "../examples/withheld/plan.rs"]
-mod plan;
-#[path = "../examples/withheld/plant.rs"]
-mod plant;
-#[path = "../examples/withheld/random.rs"]
-mod random;
-#[path = "../examples/withheld/refit.rs"]
-mod refit;
-#[path = "../examples/withheld/robots.rs"]
-mod robots;
-#[path = "../examples/withheld/score.rs"]
-mod score;
-#[path = "../examples/withheld/simulate.rs"]
-mod simulate;
-#[path = "../examples/withheld/table.rs"]
-mod table;
-#[path = "../examples/withheld/write.rs"]
-mod write;
-
-use chain::{Chain, Kinematics};
 use excite::Robot;
 use excite::dynamics::{Samples, Tree};
 use excite::regressor::nominal_torque;
-use random::Random;
 use serde_json::json;
+use withheld::chain::{Chain, Kinematics};
+use withheld::random::Random;
+use withheld::{case, disturb, motion, plant, robots, score, simulate, write};
 
 fn torque(chain: &Chain, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
     let mut k = Kinematics::default();
