@@ -1,6 +1,6 @@
 //! Design for parallel robots: derivatives, limits between the samples, conditions reached.
 
-mod common;
+use crate::common;
 
 use common::parallel::{self, check_at_100_khz};
 use excite::Plant;

@@ -2,7 +2,7 @@
 //! read from the folder named by `EXCITE_CHECKS` (or beside the project), a few cases of each come
 //! with the tests.
 
-mod common;
+use crate::common;
 
 use common::parallel::{checks, delta, h4, hexapod, matrix, numbers, reference, vector};
 use excite::base::BaseParameters;

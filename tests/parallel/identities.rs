@@ -1,7 +1,7 @@
 //! Identities of closed chains on random geometry: regressor and inverse dynamics, power balance,
 //! gradients, forward after inverse kinematics, singular layouts, and what is said of bad input.
 
-mod common;
+use crate::common;
 
 use common::parallel::{delta, h4, hexapod, reference};
 use excite::dynamics::{Isa, Samples, Workspace};

@@ -1,6 +1,6 @@
 //! Serial and parallel robots behind one face.
 
-mod common;
+use crate::common;
 
 use common::parallel;
 use excite::Plant;

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)]
 
-#[path = "../examples/07_h4_identification.rs"]
+#[path = "../../examples/07_h4_identification.rs"]
 mod h4;
 
 #[test]

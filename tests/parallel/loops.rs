@@ -1,6 +1,6 @@
 //! Trees with loops: against the mechanisms in closed form, against differences, and files of them.
 
-mod common;
+use crate::common;
 
 use common::parallel::{check_at_100_khz, delta, h4, hexapod, reference};
 use excite::Plant;

@@ -1,7 +1,7 @@
 //! Loads from logs of the drives: exact where there is no noise, within the stated bounds with
 //! residual friction and noise.
 
-mod common;
+use crate::common;
 
 use excite::dynamics::Samples;
 use excite::load::body::{from_quantities, quantities};

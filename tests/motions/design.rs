@@ -1,7 +1,7 @@
 //! The design: exact derivatives of every criterion, limits between the samples, built-in ends, the
 //! same answer on any number of threads, and the best so far on interruption.
 
-mod common;
+use crate::common;
 
 use excite::base::BaseParameters;
 use excite::design::criterion::{Condition, Criterion, Objective};

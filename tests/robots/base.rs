@@ -1,6 +1,6 @@
 //! Base parameters: known ranks, independence of the states and of rounding, readable output.
 
-mod common;
+use crate::common;
 
 use excite::base::{BaseParameters, Identifiability, random_states};
 use excite::regressor::Regressor;

@@ -1,7 +1,7 @@
 //! Identities that must hold on any robot: `Y φ = RNEA`, power balance, derivatives, and the same
 //! bits from every instruction set.
 
-mod common;
+use crate::common;
 
 use excite::dynamics::{Derivatives, Isa, Samples, Tree, Workspace};
 use excite::robot::Robot;

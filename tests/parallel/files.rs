@@ -1,7 +1,7 @@
 //! Robot files of parallel robots: what they say is what the mechanism does, through the program,
 //! and mistakes in them are named.
 
-mod common;
+use crate::common;
 
 use assert_cmd::Command;
 use common::parallel::{checks, matrix, numbers, reference};

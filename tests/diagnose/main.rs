@@ -1,0 +1,9 @@
+//! The diagnosis: what it finds, on arms and parallel robots, the controller it reads, and the next motion.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod controller;
+mod findings;
+mod next;
+mod parallel;

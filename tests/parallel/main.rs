@@ -1,0 +1,11 @@
+//! Parallel robots: files, kinematics and dynamics, loops, design, and a mechanism of a user.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod design;
+mod files;
+mod identities;
+mod loops;
+mod new_mechanism;
+mod reference;

@@ -1,0 +1,8 @@
+//! Records: logs, signals, and the simulator that writes them.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod log;
+mod signals;
+mod simulate;

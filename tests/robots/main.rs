@@ -1,0 +1,11 @@
+//! Robots: files, trees, base parameters, and identities of their dynamics.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod base;
+mod files;
+mod identities;
+mod plant;
+mod reference;
+mod tree;
