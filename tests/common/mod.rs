@@ -1,8 +1,12 @@
-//! Random robots and motions for the identity tests.
+//! What tests share: random robots and motions, comparisons, noise, rehearsals, and data from elsewhere.
 #![allow(dead_code, clippy::needless_range_loop)]
 
+pub mod compare;
+pub mod noise;
 pub mod parallel;
 pub mod parallel_toml;
+pub mod rehearse;
+pub mod shared;
 pub mod tripod;
 
 use excite::dynamics::Samples;

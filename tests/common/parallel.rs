@@ -1,6 +1,7 @@
 //! Parallel robots from the JSON of reference models, and where those lie.
 #![allow(dead_code)]
 
+use super::shared::checks;
 use excite::dynamics::Samples;
 use excite::mechanism::delta::Delta;
 use excite::mechanism::gough_stewart::{self, GoughStewart, Leg};
@@ -10,20 +11,9 @@ use excite::mechanism::{Mechanism, closed_certificate};
 use excite::robot::{Inertia, Limits};
 use excite::trajectory::Fourier;
 use nalgebra::{Matrix3, Vector3};
+use rand::Rng;
 use serde_json::Value;
 use std::path::PathBuf;
-
-/// The full set of reference cases, where it is at hand.
-pub fn checks() -> Option<PathBuf> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let named = std::env::var_os("EXCITE_CHECKS").map(PathBuf::from);
-    let shared = std::env::var_os("EXCITE_SHARED").map(|p| PathBuf::from(p).join("checks"));
-    named
-        .into_iter()
-        .chain(shared)
-        .chain(["../shared/checks", "../../shared/checks"].map(|p| root.join(p)))
-        .find(|p| p.is_dir())
-}
 
 /// Model and cases of `sg`, `h4` or `delta`: the full set, or the few that come with the tests.
 pub fn reference(name: &str) -> (Value, Vec<Value>) {
@@ -37,7 +27,6 @@ pub fn reference(name: &str) -> (Value, Vec<Value>) {
             (model, cases["cases"].as_array().unwrap().clone())
         }
         None => {
-            println!("reference folder absent: only the cases in tests/data");
             let own =
                 read(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/parallel.json"));
             (
@@ -286,4 +275,19 @@ pub fn check_at_100_khz(mechanism: &Mechanism, fourier: &Fourier) {
             );
         }
     }
+}
+
+/// Random poses in the workspace of a mechanism, rates up to one and accelerations up to `acceleration`.
+pub fn states(m: &Mechanism, count: usize, seed: u64, acceleration: f64) -> Samples {
+    let r = &mut super::rng(seed);
+    let mut x = Samples::zeros(m.freedoms(), count);
+    for k in 0..m.freedoms() {
+        let [low, high] = m.workspace[k].position;
+        for s in 0..count {
+            x.q[k * count + s] = r.random_range(low..high);
+            x.qd[k * count + s] = r.random_range(-1.0..1.0);
+            x.qdd[k * count + s] = r.random_range(-acceleration..acceleration);
+        }
+    }
+    x
 }

@@ -2,6 +2,8 @@
 //! commands: gains that were set are found again, and the simulated model moves as it does when it is run
 //! under that controller. And how close an identified model is.
 
+use crate::common::rehearse::{self, Log, without_commands};
+use crate::common::shared::shared;
 use excite::diagnose::controller::{Feedback, Kind, identify};
 use excite::diagnose::evidence::Evidence;
 use excite::diagnose::record::Raw;
@@ -13,7 +15,6 @@ use excite::simulate::record::{Sensors, measure};
 use excite::simulate::{Controller, Effects, Settings as Simulation, simulate};
 use excite::trajectory::{Fourier, Series};
 use std::f64::consts::TAU;
-use std::path::Path;
 
 const RATE: f64 = 250.0;
 /// Noise, in units of what the robot file states.
@@ -46,26 +47,8 @@ fn settings(controller: Controller, bandwidth: f64, perturb: f64) -> Simulation 
 }
 
 /// A log of the simulated robot with its commanded positions, and its true positions.
-fn log(
-    plant: &Plant,
-    motion: &Fourier,
-    fit: bool,
-    settings: &Simulation,
-    noise: f64,
-) -> (Raw, Vec<f64>) {
-    let run = simulate(plant, motion, 3, settings, &|_| {}).unwrap();
-    let seen = measure(&run, &Sensors::new(plant, noise).0, &settings.effects, 7);
-    let columns = |x: &[f64]| x.chunks(run.t.len()).map(<[f64]>::to_vec).collect();
-    let raw = Raw {
-        name: format!("{:.2} s", motion.period),
-        fit,
-        period: Some(motion.period),
-        q: columns(&seen.q),
-        tau: columns(&seen.tau),
-        qref: Some(columns(&run.reference)),
-        t: run.t,
-    };
-    (raw, run.actuators.q)
+fn log(plant: &Plant, motion: &Fourier, fit: bool, settings: &Simulation, noise: f64) -> Log {
+    rehearse::log(plant, motion, fit, settings, noise, 7)
 }
 
 fn feedback(plant: &Plant, raws: &[Raw]) -> Result<Feedback, String> {
@@ -81,7 +64,7 @@ fn inverse_dynamics_control_is_found_and_gives_the_motion_of_the_model() {
     let fast = motion(6, 4.0, 0.5);
     let slow = motion(6, 6.0, 0.4);
     let raws: Vec<Raw> = [(&fast, true), (&slow, false)]
-        .map(|(m, fit)| log(&plant, m, fit, &real, NOISE).0)
+        .map(|(m, fit)| log(&plant, m, fit, &real, NOISE).raw)
         .into();
     let found = feedback(&plant, &raws).unwrap();
     let omega = TAU * 3.0;
@@ -97,9 +80,9 @@ fn inverse_dynamics_control_is_found_and_gives_the_motion_of_the_model() {
     assert_eq!(ki, 0.0);
 
     // the model under this controller, by the simulator; and by the diagnosis, which has only the logs
-    let truth = log(&plant, &slow, false, &real, NOISE).1;
+    let truth = log(&plant, &slow, false, &real, NOISE).truth;
     let model = settings(Controller::Feedforward, 3.0, 0.0);
-    let moved = log(&plant, &slow, false, &model, NOISE).1;
+    let moved = log(&plant, &slow, false, &model, NOISE).truth;
     let plain = Settings {
         next: false,
         ..Settings::default()
@@ -208,7 +191,7 @@ fn gains_of_single_joints_are_found() {
 fn torque_without_feedback_gives_no_gains() {
     let plant = Plant::load("planar2").unwrap();
     let sim = settings(Controller::Feedforward, 10.0, 0.1);
-    let (mut raw, _) = log(&plant, &motion(2, 3.0, 0.6), true, &sim, NOISE);
+    let mut raw = log(&plant, &motion(2, 3.0, 0.6), true, &sim, NOISE).raw;
     let shifted = raw.t.len() / 5;
     for q in raw.qref.iter_mut().flatten() {
         q.rotate_left(shifted);
@@ -221,11 +204,10 @@ fn torque_without_feedback_gives_no_gains() {
 /// k_p = 160.18 /s, so that the ratio of the two gains is known whatever the scale of the torque.
 #[test]
 fn the_controller_of_the_emps() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/emps");
-    let Ok(experiment) = Experiment::read(folder.join("experiment.toml")) else {
-        println!("skipped: {} is not there", folder.display());
+    let Some(folder) = shared("data/emps") else {
         return;
     };
+    let experiment = Experiment::read(folder.join("experiment.toml")).unwrap();
     let raws = raw(&experiment).unwrap();
     let found = feedback(&experiment.plant, &raws).unwrap();
     let [kp, kd, _] = found.gains[0];
@@ -252,8 +234,7 @@ fn identified(perturb: f64, load: Option<f64>) -> Diagnosis {
     });
     let raws: Vec<Raw> = [(4.0, 0.6, true), (6.5, 0.5, true), (5.0, 0.55, false)]
         .map(|(period, size, fit)| {
-            let (raw, _) = log(&plant, &motion(6, period, size), fit, &sim, 1.0);
-            Raw { qref: None, ..raw }
+            without_commands(log(&plant, &motion(6, period, size), fit, &sim, 1.0))
         })
         .into();
     let plain = Settings {

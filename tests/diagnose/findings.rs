@@ -3,6 +3,9 @@
 
 #![allow(clippy::type_complexity)] // motions and laws are closures
 
+use crate::common::noise::normal;
+use crate::common::rng;
+use crate::common::shared::shared;
 use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, Verdict, diagnose, json, of_logs, page};
 use excite::dynamics::{Samples, Tree};
@@ -11,9 +14,7 @@ use excite::plant::Plant;
 use excite::regressor::nominal_torque;
 use excite::robot::JointTerm;
 use excite::trajectory::{Fourier, Series};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use std::path::PathBuf;
+use rand::Rng;
 
 const RATE: f64 = 200.0;
 
@@ -39,7 +40,7 @@ fn robots() -> (Plant, excite::Robot) {
 
 /// A motion of odd harmonics and one of others, each slow or fast.
 fn motion(period: f64, odd: bool, seed: u64) -> Fourier {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut rng = rng(seed);
     let harmonics: Vec<u32> = if odd {
         vec![1, 3, 5, 7]
     } else {
@@ -73,8 +74,7 @@ fn log(
     let per = (f.period * RATE).round() as usize;
     let count = per * periods;
     let mut x = Samples::zeros(2, count);
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+    let mut rng = rng(seed);
     let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     let mut states = Vec::new();
     for i in 0..count {
@@ -100,8 +100,8 @@ fn log(
         for j in 0..2 {
             let clean = tau[j * count + i];
             let added = extra(j, i as f64 / RATE, q, v, clean);
-            raw.tau[j].push(clean + added + 0.1 * normal());
-            raw.q[j].push(((q[j] + 3e-6 * normal()) / 1e-5).round() * 1e-5);
+            raw.tau[j].push(clean + added + 0.1 * normal(&mut rng));
+            raw.q[j].push(((q[j] + 3e-6 * normal(&mut rng)) / 1e-5).round() * 1e-5);
         }
     }
     raw
@@ -259,24 +259,6 @@ fn a_load_that_sloshes_has_no_name() {
     // what was tried gains as much where it makes no sense
     let decoys: Vec<f64> = d.findings.iter().filter_map(|f| f.decoys).collect();
     assert!(decoys.iter().all(|v| *v > 0.5), "{decoys:?}");
-}
-
-fn shared(folder: &str) -> Option<PathBuf> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let all = [
-        std::env::var_os("EXCITE_SHARED").map(PathBuf::from),
-        Some(root.join("../shared")),
-        Some(root.join("../../shared")),
-    ];
-    let found = all
-        .into_iter()
-        .flatten()
-        .map(|p| p.join(folder))
-        .find(|p| p.exists());
-    if found.is_none() {
-        println!("skipped: no folder shared/{folder}");
-    }
-    found
 }
 
 fn of_folder(folder: &str) -> Option<Diagnosis> {

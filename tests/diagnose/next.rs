@@ -1,19 +1,17 @@
 //! The next motion: what two effects, or an effect and the nominal model, have in common in the records
 //! at hand, in the proposed motion as predicted, and once that motion is rehearsed.
 //!
-//! `cargo test --release --test diagnose_next -- --nocapture` prints the table of `docs/diagnosis.md`.
+//! `cargo test --release --test diagnose next -- --nocapture` prints the table of `docs/diagnosis.md`.
 
-use excite::design::{Condition, Settings as Design, design_plant};
+use crate::common::rehearse::{self, log, within, without_commands};
 use excite::diagnose::next::{NOMINAL, Proposal};
 use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
 use excite::identifiability::Assessment;
 use excite::mechanism::closed_certificate;
 use excite::plant::Plant;
-use excite::simulate::record::{Sensors, measure};
-use excite::simulate::{Effects, Field, Settings as Simulation, simulate};
-use excite::trajectory::{Ends, Fourier, Grid, Trajectory};
-use std::sync::atomic::AtomicBool;
+use excite::simulate::{Effects, Field};
+use excite::trajectory::{Fourier, Trajectory};
 
 /// A robot, what it has that its model lacks, and the records of a designed motion.
 struct Case {
@@ -33,26 +31,13 @@ impl Case {
         only: Option<usize>,
     ) -> Self {
         let plant = Plant::load(robot).unwrap();
-        let settings = Design {
-            harmonics: 3,
-            period: 5.0,
-            grid: Grid::Odd,
-            ends: Ends::Free,
-            condition: Condition::Normalised,
-            starts: Some(1),
-            ..Design::default()
-        };
-        let found = design_plant(&plant, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
-        let mut motion = found.trajectory.fourier;
+        let mut motion = rehearse::motion(robot);
         for (k, s) in motion.joints.iter_mut().enumerate() {
             if only.is_some_and(|o| o != k) {
                 s.sin.iter_mut().chain(&mut s.cos).for_each(|v| *v = 0.0);
             }
         }
-        let at = |factor: f64| Fourier {
-            period: 5.0 * slower * factor,
-            ..motion.clone()
-        };
+        let at = |factor: f64| within(&motion, 5.0 * slower * factor);
         let mut effects = Effects {
             perturb: 0.03,
             ..Effects::default()
@@ -69,29 +54,10 @@ impl Case {
     }
 
     fn logs(&self) -> Vec<Raw> {
+        let settings = rehearse::simulation(self.effects.clone());
         let one = |(motion, fit): &(Fourier, bool)| {
-            let settings = Simulation {
-                rate: 200.0,
-                step: 5e-4,
-                bandwidth: 30.0,
-                seed: 1,
-                effects: self.effects.clone(),
-                ..Simulation::default()
-            };
-            let run = simulate(&self.plant, motion, 3, &settings, &|_| {}).unwrap();
-            let sensors = Sensors::new(&self.plant, self.noise).0;
             let seed = (10.0 * motion.period) as u64;
-            let seen = measure(&run, &sensors, &settings.effects, seed);
-            let columns = |x: &[f64]| x.chunks(run.t.len()).map(<[f64]>::to_vec).collect();
-            Raw {
-                name: format!("{:.2} s", motion.period),
-                fit: *fit,
-                period: Some(motion.period),
-                q: columns(&seen.q),
-                tau: columns(&seen.tau),
-                t: run.t,
-                qref: None,
-            }
+            without_commands(log(&self.plant, motion, *fit, &settings, self.noise, seed))
         };
         self.runs.iter().map(one).collect()
     }

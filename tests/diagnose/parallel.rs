@@ -1,19 +1,17 @@
 //! Parallel robots rehearsed and diagnosed: the simulated robot has what the model lacks.
 //!
-//! `cargo test --release --test diagnose_parallel -- --nocapture` prints the table of
+//! `cargo test --release --test diagnose parallel -- --nocapture` prints the table of
 //! `docs/diagnosis.md`.
 
-use excite::design::{Condition, Settings as Design, design_plant};
+use crate::common::rehearse::{self, log, within, without_commands};
 use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, of_logs};
 use excite::mechanism::bundled;
 use excite::plant::Plant;
 use excite::robot::Inertia;
 use excite::simulate::effects::parse_payload;
-use excite::simulate::record::{Sensors, measure};
-use excite::simulate::{Effects, Field, Settings as Simulation, simulate};
-use excite::trajectory::{Ends, Fourier, Grid};
-use std::sync::atomic::AtomicBool;
+use excite::simulate::{Effects, Field};
+use excite::trajectory::Fourier;
 
 /// A robot and a motion for it.
 struct Rehearsal {
@@ -33,20 +31,9 @@ fn plant(text: &str) -> Plant {
 
 impl Rehearsal {
     fn new(name: &str) -> Self {
-        let settings = Design {
-            harmonics: 3,
-            period: 5.0,
-            grid: Grid::Odd,
-            ends: Ends::Free,
-            condition: Condition::Normalised,
-            starts: Some(1),
-            ..Design::default()
-        };
-        let robot = Plant::load(name).unwrap();
-        let found = design_plant(&robot, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
         Rehearsal {
             text: bundled::find(name).unwrap().toml.into(),
-            motion: found.trajectory.fourier,
+            motion: rehearse::motion(name),
             noise: 1.0,
         }
     }
@@ -55,40 +42,13 @@ impl Rehearsal {
     /// fitted to.
     fn logs(&self, robot: &Plant, effects: Effects) -> Vec<Raw> {
         let speeds = [(5.0, true), (9.0, true), (6.5, false)];
+        let settings = rehearse::simulation(Effects {
+            perturb: 0.03,
+            ..effects
+        });
         let one = |(period, fit): (f64, bool)| {
-            let motion = Fourier {
-                period,
-                ..self.motion.clone()
-            };
-            let settings = Simulation {
-                rate: 200.0,
-                step: 5e-4,
-                bandwidth: 30.0,
-                seed: 1,
-                effects: Effects {
-                    perturb: 0.03,
-                    ..effects.clone()
-                },
-                ..Simulation::default()
-            };
-            let run = simulate(robot, &motion, 3, &settings, &|_| {}).unwrap();
-            let seed = (10.0 * period) as u64;
-            let seen = measure(
-                &run,
-                &Sensors::new(robot, self.noise).0,
-                &settings.effects,
-                seed,
-            );
-            let columns = |x: &[f64]| x.chunks(run.t.len()).map(<[f64]>::to_vec).collect();
-            Raw {
-                name: format!("{period} s"),
-                fit,
-                period: Some(period),
-                q: columns(&seen.q),
-                tau: columns(&seen.tau),
-                t: run.t,
-                qref: None,
-            }
+            let (motion, seed) = (within(&self.motion, period), (10.0 * period) as u64);
+            without_commands(log(robot, &motion, fit, &settings, self.noise, seed))
         };
         speeds.map(one).into()
     }

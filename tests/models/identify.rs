@@ -1,22 +1,16 @@
 //! Identification: exact without noise, honest with it, possible always, and right on real robots.
 
+use crate::common::compare::largest;
+use crate::common::noise::normal;
+use crate::common::rng;
+use crate::common::shared::shared;
 use excite::identify::{Consistency, Identification, Method, Settings, identify, robot};
 use excite::log::{Experiment, Payload, Purpose, Record};
 use excite::robot::JointTerm;
 use excite::{Plant, Robot};
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 use std::f64::consts::PI;
 use std::path::PathBuf;
-
-fn rng(seed: u64) -> ChaCha8Rng {
-    ChaCha8Rng::seed_from_u64(seed)
-}
-
-/// Standard normal, by the sum of twelve.
-fn normal(r: &mut impl Rng) -> f64 {
-    (0..12).map(|_| r.random_range(-0.5..0.5)).sum()
-}
 
 /// A robot with all joint terms, and values of its parameters that are not the nominal ones.
 fn truth(name: &str, seed: u64) -> (Plant, Vec<f64>) {
@@ -152,7 +146,7 @@ fn record(plant: &Plant, phi: &[f64], purpose: Purpose, run: &Run) -> Record {
 
 fn worst(id: &Identification, phi: &[f64], pi: &[f64]) -> f64 {
     let exact = id.base.project(phi);
-    let size = exact.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let size = largest(&exact);
     exact
         .iter()
         .zip(pi)
@@ -595,24 +589,14 @@ fn torques_in_other_units_are_suspected() {
     );
 }
 
-fn shared(name: &str) -> Option<Experiment> {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    let from_env = std::env::var_os("EXCITE_SHARED").map(PathBuf::from);
-    let places = [root.join("../shared"), root.join("../../shared")];
-    let path = from_env
-        .into_iter()
-        .chain(places)
-        .map(|p| p.join("data").join(name).join("experiment.toml"))
-        .find(|p| p.is_file());
-    if path.is_none() {
-        println!("skipped: the recordings of {name} are not here");
-    }
-    path.map(|p| Experiment::read(p).unwrap())
+fn recorded(name: &str) -> Option<Experiment> {
+    let folder = shared(&format!("data/{name}"))?;
+    Some(Experiment::read(folder.join("experiment.toml")).unwrap())
 }
 
 #[test]
 fn emps_gives_the_published_values() {
-    let Some(e) = shared("emps") else { return };
+    let Some(e) = recorded("emps") else { return };
     // a strength at which the prior, which holds the published values, does nothing
     let settings = Settings {
         prior_strength: Some(1e-2),
@@ -649,7 +633,7 @@ fn emps_gives_the_published_values() {
 
 #[test]
 fn panda_predicts_its_second_half() {
-    let Some(e) = shared("panda") else { return };
+    let Some(e) = recorded("panda") else { return };
     let Plant::Serial(robot) = e.plant else {
         panic!()
     };
@@ -666,7 +650,7 @@ fn panda_predicts_its_second_half() {
 
 #[test]
 fn tx40_is_better_than_plain_least_squares_and_says_what_is_left() {
-    let Some(e) = shared("tx40") else { return };
+    let Some(e) = recorded("tx40") else { return };
     let id = identify(&e.plant, &e.records, &Settings::default()).unwrap();
     let v = &id.validation;
     let h = v.holdout.as_ref().unwrap().relative_error;

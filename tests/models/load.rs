@@ -1,8 +1,10 @@
 //! Loads from logs of the drives: exact where there is no noise, within the stated bounds with
 //! residual friction and noise.
 
-use crate::common;
-
+use crate::common::compare::largest;
+use crate::common::noise::normal;
+use crate::common::parallel::{matrix, numbers, vector};
+use crate::common::shared::checks;
 use excite::dynamics::Samples;
 use excite::load::body::{from_quantities, quantities};
 use excite::load::two_step::PlatformSample;
@@ -20,11 +22,6 @@ use serde_json::Value;
 const LOAD: [f64; 10] = [
     22.26, 0.03, -0.02, 0.12, 0.26, 0.012, -0.02, 0.29, 0.015, 0.33,
 ];
-
-fn normal(r: &mut ChaCha8Rng) -> f64 {
-    let u: f64 = 1.0 - r.random::<f64>();
-    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * r.random::<f64>()).cos()
-}
 
 /// Sums of sines of several frequencies in every coordinate, other ones in each of a platform's.
 fn multisine(plant: &Plant, count: usize, rate: f64, harmonics: &[f64], seed: u64) -> Samples {
@@ -150,10 +147,6 @@ fn errors(found: &[f64; 10], truth: &[f64; 10]) -> [f64; 10] {
     std::array::from_fn(|i| (found[i] - truth[i]) / scale[i])
 }
 
-fn worst(e: &[f64]) -> f64 {
-    e.iter().fold(0.0, |m, x| m.max(x.abs()))
-}
-
 fn hexapod(truth: &Truth, rate: f64, count: usize, seed: u64, settings: &Settings) -> Identified {
     let plant = Plant::load("hexapod").unwrap();
     // 0.3 to 1.8 Hz
@@ -193,8 +186,7 @@ fn hexapod(truth: &Truth, rate: f64, count: usize, seed: u64, settings: &Setting
 
 #[test]
 fn the_published_equations_hold_for_the_reference_samples() {
-    let Some(folder) = common::parallel::checks() else {
-        println!("reference folder absent: skipped");
+    let Some(folder) = checks() else {
         return;
     };
     let text = std::fs::read_to_string(folder.join("load_two_step.json")).unwrap();
@@ -205,10 +197,9 @@ fn the_published_equations_hold_for_the_reference_samples() {
     for name in ["single", "multi"] {
         let case = &all["exact"][name];
         let s = &case["sample"];
-        let vector = |v: &Value| common::parallel::vector(v);
-        let f = common::parallel::numbers(&s["f"]);
+        let f = numbers(&s["f"]);
         let force: Vector3<f64> = (0..6).map(|j| vector(&s["s"][j]) * f[j]).sum();
-        let rotation = common::parallel::matrix(&s["R"]);
+        let rotation = matrix(&s["R"]);
         let moment: Vector3<f64> = (0..6)
             .map(|j| {
                 let arm = rotation * vector(&model["legs"][j]["b"]);
@@ -232,7 +223,7 @@ fn the_published_equations_hold_for_the_reference_samples() {
             "{name}: {}",
             phi * theta - y
         );
-        let jc = common::parallel::numbers(&case["JC"]);
+        let jc = numbers(&case["JC"]);
         let (phi, y) = sample.euler(&r);
         let tensor = nalgebra::Vector6::from_column_slice(&jc);
         assert!((phi * tensor - y).norm() < 1e-10, "{name}");
@@ -243,15 +234,15 @@ fn the_published_equations_hold_for_the_reference_samples() {
         v[4..].copy_from_slice(&jc);
         let total = from_quantities(&v);
         let back = quantities(&total);
-        assert!(worst(&errors(&back, &v)) < 1e-9);
+        assert!(largest(&errors(&back, &v)) < 1e-9);
         let load = case["load_r"].as_array().unwrap();
-        let lj = common::parallel::matrix(&case["load_JC"]);
+        let lj = matrix(&case["load_JC"]);
         let load = Inertia::from_com(
             case["load_m"].as_f64().unwrap(),
             Vector3::from_iterator(load.iter().map(|x| x.as_f64().unwrap())),
             lj,
         );
-        assert!(worst(&errors(&quantities(&load), &LOAD)) < 1e-8);
+        assert!(largest(&errors(&quantities(&load), &LOAD)) < 1e-8);
         // and the rest is a platform of 30 kg that can exist
         let platform = excite::load::body::difference(&total, &load);
         assert!((platform.mass() - 30.0).abs() < 1e-9);
@@ -270,12 +261,12 @@ fn both_methods_are_exact_without_noise() {
     let two = errors(&found.two_step.as_ref().unwrap().load.values(), &LOAD);
     println!(
         "one step {:.1e}, two steps {:.1e}",
-        worst(&one),
-        worst(&two)
+        largest(&one),
+        largest(&two)
     );
     // in percent and millimetres: 1e-10 of the quantities
-    assert!(worst(&one) < 1e-8, "{one:?}");
-    assert!(worst(&two) < 1e-7, "{two:?}");
+    assert!(largest(&one) < 1e-8, "{one:?}");
+    assert!(largest(&two) < 1e-7, "{two:?}");
     let friction = &found.one_step.records[1].friction[0];
     assert!((friction.coulomb - 28.0).abs() < 1e-8, "{friction:?}");
     // from the nominal platform alone
@@ -286,7 +277,7 @@ fn both_methods_are_exact_without_noise() {
         Payload::Unknown,
     )];
     let found = from_records(&plant, only, &Settings::default()).unwrap();
-    assert!(worst(&errors(&found.load().values(), &LOAD)) < 1e-8);
+    assert!(largest(&errors(&found.load().values(), &LOAD)) < 1e-8);
     assert!(found.warnings.iter().any(|w| w.message.contains("nominal")));
 }
 
@@ -310,8 +301,8 @@ fn stribeck_friction_and_noise_stay_within_the_targets() {
         let add = |to: &mut [f64; 3], v: &[f64; 10]| {
             let e = errors(v, &LOAD);
             to[0] = to[0].max(e[0].abs());
-            to[1] = to[1].max(worst(&e[1..4]));
-            to[2] = to[2].max(worst(&e[4..]));
+            to[1] = to[1].max(largest(&e[1..4]));
+            to[2] = to[2].max(largest(&e[4..]));
         };
         add(&mut one, &found.one_step.load.values());
         add(&mut plain, &unweighted.one_step.load.values());
@@ -374,7 +365,7 @@ fn payload_of_a_serial_robot() {
     };
     let found = from_records(&plant, records(), &Settings::default()).unwrap();
     let e = errors(&found.load().values(), &quantities(&load));
-    assert!(worst(&e) < 1e-5, "{e:?}");
+    assert!(largest(&e) < 1e-5, "{e:?}");
     assert!(found.two_step.is_none() && !found.no_two_step.is_empty());
     // mass and centre of mass of a point mass
     let point = Inertia::from_com(3.0, Vector3::new(0.01, 0.02, 0.1), Matrix3::zeros());

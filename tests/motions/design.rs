@@ -2,6 +2,7 @@
 //! same answer on any number of threads, and the best so far on interruption.
 
 use crate::common;
+use crate::common::compare::largest;
 
 use excite::base::BaseParameters;
 use excite::design::criterion::{Condition, Criterion, Objective};
@@ -83,7 +84,7 @@ fn smoothed_gradients_match_differences() {
             info.evaluate(&x, &mut e);
             let s = objective.spectrum(&e.gram).unwrap();
             let g = objective.smooth_gradient(&info, &mut e, &s, 6.0);
-            let size = g.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+            let size = largest(&g);
             for (k, g) in g.iter().enumerate() {
                 let d = difference(&x, k, &value);
                 assert!(

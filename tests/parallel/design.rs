@@ -1,6 +1,7 @@
 //! Design for parallel robots: derivatives, limits between the samples, conditions reached.
 
 use crate::common;
+use crate::common::compare::largest;
 
 use common::parallel::{self, check_at_100_khz};
 use excite::Plant;
@@ -93,7 +94,7 @@ fn gradients_are_the_differences_of_the_criterion() {
         assert!(value.is_finite());
         let spectrum = objective.spectrum(&e.gram).unwrap();
         let gradient = objective.smooth_gradient(&info, &mut e, &spectrum, 10.0);
-        let size = gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+        let size = largest(&gradient);
         for k in (0..x.len()).step_by(3) {
             let at = |h: f64| {
                 let mut y = x.clone();

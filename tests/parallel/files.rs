@@ -2,9 +2,11 @@
 //! and mistakes in them are named.
 
 use crate::common;
+use crate::common::compare::{difference, largest};
+use crate::common::shared::checks;
 
 use assert_cmd::Command;
-use common::parallel::{checks, matrix, numbers, reference};
+use common::parallel::{matrix, numbers, reference};
 use common::parallel_toml::{chains, hexapod};
 use excite::Plant;
 use excite::mechanism::{Mechanism, bundled};
@@ -157,9 +159,6 @@ fn base_parameter_counts_of_robot_files() {
         let text = std::fs::read_to_string(f.join("base_parameter_counts.json")).unwrap();
         serde_json::from_str(&text).unwrap()
     });
-    if counts.is_none() {
-        println!("reference folder absent: counts as known");
-    }
     let expect = |line: &str, ours: usize, known: usize| {
         let theirs = counts
             .as_ref()
@@ -564,11 +563,7 @@ fn an_identified_mechanism_is_written_and_read() {
             plant.torque(&x, &phi).unwrap(),
             again.nominal_torque(&x).unwrap(),
         );
-        let size = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let off = a
-            .iter()
-            .zip(&b)
-            .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        let (size, off) = (largest(&a), difference(&a, &b));
         println!("{i}: off by {:.1e}", off / size);
         assert!(off < 1e-12 * size, "{i}: {off:e}\n{toml}");
     }

@@ -2,8 +2,7 @@
 //! gradients, forward after inverse kinematics, singular layouts, and what is said of bad input.
 
 use crate::common;
-
-use common::parallel::{delta, h4, hexapod, reference};
+use crate::common::parallel::{delta, h4, hexapod, reference, states};
 use excite::dynamics::{Isa, Samples, Workspace};
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart};
 use excite::mechanism::h4::{H4, Model};
@@ -77,24 +76,10 @@ fn mechanisms() -> Vec<Mechanism> {
     all
 }
 
-fn motion(m: &Mechanism, count: usize, seed: u64) -> Samples {
-    let r = &mut common::rng(seed);
-    let mut x = Samples::zeros(m.freedoms(), count);
-    for k in 0..m.freedoms() {
-        let [low, high] = m.workspace[k].position;
-        for s in 0..count {
-            x.q[k * count + s] = r.random_range(low..high);
-            x.qd[k * count + s] = r.random_range(-1.0..1.0);
-            x.qdd[k * count + s] = r.random_range(-5.0..5.0);
-        }
-    }
-    x
-}
-
 #[test]
 fn regressor_times_parameters_is_inverse_dynamics() {
     for (i, m) in mechanisms().iter().enumerate() {
-        let x = motion(m, 300, i as u64);
+        let x = states(m, 300, i as u64, 5.0);
         let w = m.regressor(&x).unwrap();
         let phi = m.parameters.values();
         let tau = m.torque(&x, &phi).unwrap();
@@ -119,7 +104,7 @@ fn regressor_times_parameters_is_inverse_dynamics() {
 #[test]
 fn every_instruction_set_gives_the_same_bits() {
     let m = random_hexapod(1).build().unwrap();
-    let x = motion(&m, 77, 9);
+    let x = states(&m, 77, 9, 5.0);
     let mut first: Option<(ClosedMotion, Vec<f64>)> = None;
     for isa in Isa::available() {
         let mut closed = ClosedMotion::default();
@@ -148,7 +133,7 @@ fn every_instruction_set_gives_the_same_bits() {
 #[test]
 fn velocities_accelerations_and_jacobian_are_derivatives_of_positions() {
     for m in mechanisms() {
-        let x = motion(&m, 1, 11);
+        let x = states(&m, 1, 11, 5.0);
         let at = |s: f64| {
             let p: Vec<f64> = (0..x.dof)
                 .map(|k| x.q[k] + x.qd[k] * s + 0.5 * x.qdd[k] * s * s)
@@ -192,7 +177,7 @@ fn chains_end_on_the_platform() {
         .build()
         .unwrap()
         .with_workspace(&[0.1, 0.1, 0.1, 0.3, 0.3, 0.3]);
-    let x = motion(&m, 1, 5);
+    let x = states(&m, 1, 5, 5.0);
     let poses = common::poses(&m.robot, &m.inverse(&x.q).unwrap());
     let find = |name: &str| m.robot.bodies.iter().position(|b| b.name == name).unwrap();
     let (r, p) = poses[find("platform")];
@@ -205,7 +190,7 @@ fn chains_end_on_the_platform() {
         .build()
         .unwrap()
         .with_workspace(&[0.05, 0.05, 0.05, 0.4]);
-    let x = motion(&m, 1, 6);
+    let x = states(&m, 1, 6, 5.0);
     let poses = common::poses(&m.robot, &m.inverse(&x.q).unwrap());
     let find = |name: &str| m.robot.bodies.iter().position(|b| b.name == name).unwrap();
     for (i, chain) in robot.chains.iter().enumerate() {
@@ -250,7 +235,7 @@ fn actuator_power_is_the_change_of_energy() {
         if m.kind == "h4" && m.parameters.list.len() < 20 {
             continue; // the lumped model is no set of bodies
         }
-        let x = motion(&m, 1, 21);
+        let x = states(&m, 1, 21, 5.0);
         let path = |s: f64| -> Vec<f64> {
             (0..x.dof)
                 .map(|k| x.q[k] + x.qd[k] * s + 0.5 * x.qdd[k] * s * s)
@@ -283,7 +268,7 @@ fn actuator_power_is_the_change_of_energy() {
 fn gradients_are_those_of_difference_quotients() {
     for m in mechanisms() {
         let (count, na, dof) = (3, m.actuators(), m.freedoms());
-        let x = motion(&m, count, 31);
+        let x = states(&m, count, 31, 5.0);
         let r = &mut common::rng(32);
         let each = m.parameters.raw_count();
         let raw: Vec<f64> = (0..2 * each).map(|_| r.random_range(-1.0..1.0)).collect();
@@ -335,7 +320,7 @@ fn gradients_are_those_of_difference_quotients() {
 #[test]
 fn forward_after_inverse_is_the_identity() {
     for m in mechanisms() {
-        let x = motion(&m, 20, 41);
+        let x = states(&m, 20, 41, 5.0);
         for s in 0..20 {
             let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * 20 + s]).collect();
             let q = m.actuator_positions(&pose).unwrap();

@@ -1,8 +1,8 @@
 //! Trees with loops: against the mechanisms in closed form, against differences, and files of them.
 
-use crate::common;
-
-use common::parallel::{check_at_100_khz, delta, h4, hexapod, reference};
+use crate::common::compare::relative;
+use crate::common::parallel::{check_at_100_khz, delta, h4, hexapod, reference, states};
+use crate::common::rng;
 use excite::Plant;
 use excite::design::{Condition, Settings, design_closed};
 use excite::dynamics::{Isa, Samples};
@@ -98,17 +98,7 @@ fn pairs() -> Vec<(Mechanism, Mechanism)> {
 
 /// A motion of the actuators of `m`, from random states of its platform.
 fn motions(m: &Mechanism, count: usize, seed: u64) -> (Samples, Samples) {
-    let r = &mut common::rng(seed);
-    let n = m.freedoms();
-    let mut x = Samples::zeros(n, count);
-    for k in 0..n {
-        let [low, high] = m.workspace[k].position;
-        for s in 0..count {
-            x.q[k * count + s] = r.random_range(low..high);
-            x.qd[k * count + s] = r.random_range(-1.0..1.0);
-            x.qdd[k * count + s] = r.random_range(-8.0..8.0);
-        }
-    }
+    let x = states(m, count, seed, 8.0);
     let all = m.motion(&x).unwrap().tree;
     let take = |a: &[f64]| -> Vec<f64> {
         let rows = m.actuated.iter();
@@ -125,15 +115,6 @@ fn motions(m: &Mechanism, count: usize, seed: u64) -> (Samples, Samples) {
     (x, actuators)
 }
 
-fn worst(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let scale = b.iter().fold(1.0f64, |m, x| m.max(x.abs()));
-    a.iter()
-        .zip(b)
-        .fold(0.0f64, |m, (x, y)| m.max((x - y).abs()))
-        / scale
-}
-
 #[test]
 fn loops_move_as_the_closed_form_does() {
     for (closed, loops) in pairs() {
@@ -143,10 +124,10 @@ fn loops_move_as_the_closed_form_does() {
         let b = loops.motion(&actuators).unwrap().tree;
         // joints of the platform come first or last in either; they are the same tree
         let off = [
-            worst(&b.q, &a.q),
-            worst(&b.qd, &a.qd),
-            worst(&b.qdd, &a.qdd),
-            worst(
+            relative(&b.q, &a.q),
+            relative(&b.qd, &a.qd),
+            relative(&b.qdd, &a.qdd),
+            relative(
                 &loops.nominal_torque(&actuators).unwrap(),
                 &closed.nominal_torque(&x).unwrap(),
             ),
@@ -159,7 +140,7 @@ fn loops_move_as_the_closed_form_does() {
         let mut off = 0.0f64;
         for c in 0..w.ncols() {
             let column = |m: &faer::Mat<f64>| (0..m.nrows()).map(|r| m[(r, c)]).collect::<Vec<_>>();
-            off = off.max(worst(&column(&w), &column(&v)));
+            off = off.max(relative(&column(&w), &column(&v)));
         }
         println!("{}: regressor off by {off:.1e}", closed.kind);
         assert!(off < 1e-9);
@@ -188,7 +169,7 @@ fn loops_move_as_the_closed_form_does() {
 /// Central differences of the geometry's first outputs against its own derivatives.
 fn derivatives(m: &Mechanism, seed: u64) {
     let (n, t) = (m.robot.dof(), m.freedoms());
-    let r = &mut common::rng(seed);
+    let r = &mut rng(seed);
     let mut x = Samples::zeros(t, 1);
     for k in 0..t {
         let [low, high] = m.workspace[k].position;
@@ -372,7 +353,7 @@ fn a_five_bar_is_the_textbook_one() {
         m.nominal_torque(&states).unwrap(),
         pose.nominal_torque(&states).unwrap(),
     );
-    assert!(worst(&a, &b) < 1e-11, "{}", worst(&a, &b));
+    assert!(relative(&a, &b) < 1e-11, "{}", relative(&a, &b));
     // power of the actuators is the change of energy, whoever of three does the work
     let redundant = five_bar(REDUNDANT).unwrap();
     let said = |w: &excite::Warning| w.message.contains("3 actuators for 2 freedoms");
@@ -552,7 +533,7 @@ fn the_layout_of_example_parallel_robots_is_read() {
         point.nominal_torque(&x).unwrap(),
         ball.nominal_torque(&x).unwrap(),
     );
-    assert!(worst(&a, &b) < 1e-10, "{:e}", worst(&a, &b));
+    assert!(relative(&a, &b) < 1e-10, "{:e}", relative(&a, &b));
     write("closed_loop: [['left_end', 'nowhere']]\nname_mot: ['motor_left', 'motor_right']\n");
     let error = load(&robot).unwrap_err().to_string();
     assert!(error.contains("no link `nowhere`"), "{error}");
@@ -583,7 +564,7 @@ fn an_identified_tree_with_loops_is_written_and_read() {
     for rest in [POINT, POSE, REDUNDANT, frames] {
         let plant = Plant::Parallel(Box::new(five_bar(rest).unwrap()));
         let mut phi = plant.values();
-        let r = &mut common::rng(7);
+        let r = &mut rng(7);
         let bodies = 10 * plant.mechanism().unwrap().parameters.bodies.len();
         for body in phi[..bodies].chunks_exact_mut(10) {
             let f = r.random_range(0.8..1.2);
@@ -602,13 +583,13 @@ fn an_identified_tree_with_loops_is_written_and_read() {
         assert_eq!(again.actuator_names(), m.actuator_names());
         assert_eq!(again.task_names, m.task_names);
         assert_eq!(again.parameters.list.len(), m.parameters.list.len());
-        let off = worst(&again.home, &m.home);
+        let off = relative(&again.home, &m.home);
         assert!(off < 1e-12, "{off}");
         for (a, b) in again.workspace.iter().zip(&m.workspace) {
             assert!((a.position[0] - b.position[0]).abs() < 1e-12, "{a:?} {b:?}");
         }
         let x = m.random_states(30, 5);
-        let off = worst(
+        let off = relative(
             &again.nominal_torque(&x).unwrap(),
             &plant.torque(&x, &phi).unwrap(),
         );

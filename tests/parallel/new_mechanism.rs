@@ -3,6 +3,7 @@
 //! parameters, design, limits) is the library's; that it is right is checked against the same tree
 //! closed as a loop by Newton's method.
 
+use crate::common::compare::difference;
 use excite::design::{Condition, Settings, design_closed};
 use excite::dynamics::Samples;
 use excite::identifiability::Assessment;
@@ -161,11 +162,6 @@ fn closed_by_newton(m: &Mechanism) -> Result<Mechanism> {
     .build()
 }
 
-fn largest(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
-}
-
 #[test]
 fn it_moves_and_weighs_as_the_loop_does() {
     let m = five_bar().unwrap();
@@ -173,18 +169,18 @@ fn it_moves_and_weighs_as_the_loop_does() {
     let x = m.random_states(200, 3);
     let (a, b) = (m.motion(&x).unwrap().tree, newton.motion(&x).unwrap().tree);
     for (a, b) in [(&a.q, &b.q), (&a.qd, &b.qd), (&a.qdd, &b.qdd)] {
-        assert!(largest(a, b) < 1e-8, "{:e}", largest(a, b));
+        assert!(difference(a, b) < 1e-8, "{:e}", difference(a, b));
     }
     let tau = m.nominal_torque(&x).unwrap();
     let other = newton.nominal_torque(&x).unwrap();
-    assert!(largest(&tau, &other) < 1e-8);
+    assert!(difference(&tau, &other) < 1e-8);
     // torques are linear in the parameters, τ = Y φ
     let w = m.regressor(&x).unwrap();
     let phi = m.parameters.values();
     let linear: Vec<f64> = (0..w.nrows())
         .map(|r| (0..phi.len()).map(|c| w[(r, c)] * phi[c]).sum())
         .collect();
-    assert!(largest(&tau, &linear) < 1e-11);
+    assert!(difference(&tau, &linear) < 1e-11);
 }
 
 #[test]

@@ -3,8 +3,9 @@
 //! with the tests.
 
 use crate::common;
-
-use common::parallel::{checks, delta, h4, hexapod, matrix, numbers, reference, vector};
+use crate::common::compare::difference;
+use crate::common::parallel::{delta, h4, hexapod, matrix, numbers, reference, vector};
+use crate::common::shared::checks;
 use excite::base::BaseParameters;
 use excite::dynamics::Samples;
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart};
@@ -24,11 +25,7 @@ fn one(x: &[Vec<f64>; 3]) -> Samples {
 
 /// Largest deviation, which must be below 1e-9.
 fn deviation(what: &str, ours: &[f64], theirs: &[f64]) -> f64 {
-    assert_eq!(ours.len(), theirs.len());
-    let d = ours
-        .iter()
-        .zip(theirs)
-        .fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+    let d = difference(ours, theirs);
     assert!(d < WITHIN, "{what}: {d:e}\n{ours:?}\n{theirs:?}");
     d
 }
@@ -169,7 +166,7 @@ fn h4_states(count: usize) -> Samples {
 #[test]
 fn lumped_forearms_leave_what_the_reference_states() {
     let Some(folder) = checks() else {
-        return println!("reference folder absent: nothing to compare with");
+        return;
     };
     let text = std::fs::read_to_string(folder.join("h4_cases.json")).unwrap();
     let file: Value = serde_json::from_str(&text).unwrap();

@@ -1,6 +1,7 @@
 //! Serial and parallel robots behind one face.
 
 use crate::common;
+use crate::common::compare::largest;
 
 use common::parallel;
 use excite::Plant;
@@ -27,7 +28,7 @@ fn regressor_and_known_part_give_the_nominal_torque() {
         let x = plant.random_states(20, 3);
         let tau = plant.torque(&x, &plant.values()).unwrap();
         let nominal = plant.nominal_torque(&x).unwrap();
-        let size = nominal.iter().fold(0.0f64, |m, t| m.max(t.abs()));
+        let size = largest(&nominal);
         for (a, b) in tau.iter().zip(&nominal) {
             assert!((a - b).abs() < 1e-10 * size, "{}: {a} {b}", plant.name());
         }

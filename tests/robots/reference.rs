@@ -2,6 +2,7 @@
 //! (`tests/data/*.json`, written by `tests/data/make_reference.py`), and the regressor of the
 //! two-link arm from the textbook.
 
+use crate::common::compare::largest;
 use excite::Robot;
 use excite::base::BaseParameters;
 use excite::dynamics::{Isa, Samples, Tree, Workspace};
@@ -75,10 +76,6 @@ fn motion(robot: &Robot, reference: &Reference) -> Samples {
     )
 }
 
-fn largest(x: impl IntoIterator<Item = f64>) -> f64 {
-    x.into_iter().fold(0.0, |a, b| a.max(b.abs()))
-}
-
 #[test]
 fn torques_are_those_of_pinocchio() {
     for name in NAMES {
@@ -89,7 +86,7 @@ fn torques_are_those_of_pinocchio() {
             let ws = &mut Workspace::with_isa(isa);
             tree.inverse_dynamics(ws, &robot.parameters(), &motion, &mut tau);
             for (i, state) in reference.states.iter().enumerate() {
-                let scale = largest(state.tau.iter().copied());
+                let scale = largest(&state.tau);
                 for (j, expected) in state.tau.iter().enumerate() {
                     let found = tau[j * motion.count + i];
                     assert!(
@@ -115,7 +112,7 @@ fn regressors_are_those_of_pinocchio() {
             let Some(rows) = &state.regressor else {
                 continue;
             };
-            let scale = largest(rows.iter().flatten().flatten().flatten().copied());
+            let scale = largest(rows.iter().flatten().flatten().flatten());
             for (j, row) in rows.iter().enumerate() {
                 for (joint_name, block) in reference.bodies.iter().zip(row) {
                     let body = |b: &excite::robot::Body| b.joint_name == *joint_name;

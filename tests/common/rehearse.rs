@@ -1,0 +1,100 @@
+//! Rehearsals: a motion is designed, a robot follows it in simulation, and its sensors are read.
+
+use excite::design::{Condition, Settings as Design, design_plant};
+use excite::diagnose::record::Raw;
+use excite::plant::Plant;
+use excite::simulate::record::{Sensors, measure};
+use excite::simulate::{Effects, Settings as Simulation, simulate};
+use excite::trajectory::{Ends, Fourier, Grid};
+use std::collections::BTreeMap;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// A designed motion of a bundled robot: three odd harmonics of five seconds. One is designed for each robot, and
+/// shared by the tests of a binary.
+pub fn motion(robot: &str) -> Fourier {
+    static DESIGNED: Mutex<BTreeMap<String, Arc<OnceLock<Fourier>>>> = Mutex::new(BTreeMap::new());
+    let mut all = DESIGNED
+        .lock()
+        .expect("no design panics while it is locked");
+    let cell = all.entry(robot.into()).or_default().clone();
+    drop(all);
+    cell.get_or_init(|| {
+        let settings = Design {
+            harmonics: 3,
+            period: 5.0,
+            grid: Grid::Odd,
+            ends: Ends::Free,
+            condition: Condition::Normalised,
+            starts: Some(1),
+            ..Design::default()
+        };
+        let plant = Plant::load(robot).unwrap();
+        let found = design_plant(&plant, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
+        found.trajectory.fourier
+    })
+    .clone()
+}
+
+/// The same motion in another time.
+pub fn within(motion: &Fourier, period: f64) -> Fourier {
+    Fourier {
+        period,
+        ..motion.clone()
+    }
+}
+
+/// A simulation of a drive of 30 Hz, logged at 200 Hz.
+pub fn simulation(effects: Effects) -> Simulation {
+    Simulation {
+        rate: 200.0,
+        step: 5e-4,
+        bandwidth: 30.0,
+        seed: 1,
+        effects,
+        ..Simulation::default()
+    }
+}
+
+/// What a robot did.
+pub struct Log {
+    pub raw: Raw,
+    /// positions of the actuators without their sensors, one actuator after the other
+    pub truth: Vec<f64>,
+}
+
+/// Log of three periods of a motion; `noise` in units of what the robot file states, drawn from `seed`.
+pub fn log(
+    plant: &Plant,
+    motion: &Fourier,
+    fit: bool,
+    settings: &Simulation,
+    noise: f64,
+    seed: u64,
+) -> Log {
+    let run = simulate(plant, motion, 3, settings, &|_| {}).unwrap();
+    let sensors = Sensors::new(plant, noise).0;
+    let seen = measure(&run, &sensors, &settings.effects, seed);
+    let columns = |x: &[f64]| x.chunks(run.t.len()).map(<[f64]>::to_vec).collect();
+    let raw = Raw {
+        name: format!("{:.2} s", motion.period),
+        fit,
+        period: Some(motion.period),
+        q: columns(&seen.q),
+        tau: columns(&seen.tau),
+        qref: Some(columns(&run.reference)),
+        t: run.t,
+    };
+    Log {
+        raw,
+        truth: run.actuators.q,
+    }
+}
+
+/// A log without the commands: nothing is known of the controller.
+pub fn without_commands(log: Log) -> Raw {
+    Raw {
+        qref: None,
+        ..log.raw
+    }
+}
