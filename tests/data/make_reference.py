@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the figures that tests/reference.rs compares with: torques and regressors of Pinocchio.
+"""Writes the figures that tests/robots/reference.rs compares with: torques and regressors of Pinocchio.
 
     pip install pin numpy
     python tests/data/make_reference.py            # in the root of the repository

@@ -4,5 +4,6 @@
 mod common;
 
 mod cli;
+mod dependencies;
 mod rehearsal;
 mod report;
