@@ -10,6 +10,8 @@
 //! | [`load`] | mass, centre of mass and inertia of a load |
 //! | [`simulation`] | the simulated robot |
 //! | [`diagnosis`] | how to read a diagnosis, and what to do next |
+//! | [`diagnosis_method`] | how the diagnosis works, with its equations, constants and catalogue |
+//! | [`diagnosis_results`] | what the diagnosis found on rehearsals and real robots |
 //! | [`limits`] | what is not known, not proven, or not there |
 //! | [`withheld`] | how often the diagnosis is right |
 //! | [`results`], [`benchmarks`] | what was measured, and how to measure it again |
@@ -24,6 +26,8 @@ macro_rules! documents {
             #[doc = "[compare.md]: crate::documentation::compare"]
             #[doc = "[design.md]: crate::documentation::design"]
             #[doc = "[diagnosis.md]: crate::documentation::diagnosis"]
+            #[doc = "[diagnosis-method.md]: crate::documentation::diagnosis_method"]
+            #[doc = "[diagnosis-results.md]: crate::documentation::diagnosis_results"]
             #[doc = "[formats.md]: crate::documentation::formats"]
             #[doc = "[identification.md]: crate::documentation::identification"]
             #[doc = "[limits.md]: crate::documentation::limits"]
@@ -46,6 +50,8 @@ documents! {
     compare "compare"
     design "design"
     diagnosis "diagnosis"
+    diagnosis_method "diagnosis-method"
+    diagnosis_results "diagnosis-results"
     formats "formats"
     identification "identification"
     limits "limits"

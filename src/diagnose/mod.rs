@@ -18,7 +18,7 @@
 //! | next | [`next`] | the motion that tells rivals apart |
 //! | output | [`json`], [`page`], [`improve`] | `diagnosis.json`, report, improved robot |
 //!
-//! The method with its equations is in `docs/diagnosis.md`.
+//! The method with its equations is in `docs/diagnosis-method.md`.
 
 pub mod catalogue;
 pub mod closed;
