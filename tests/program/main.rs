@@ -5,5 +5,6 @@ mod common;
 
 mod cli;
 mod dependencies;
+mod documents;
 mod rehearsal;
 mod report;
