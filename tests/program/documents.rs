@@ -211,7 +211,7 @@ fn keys_of_a_serial_robots_files_are_documented() {
         .collect();
     let catalogue: Vec<String> = excite::diagnose::catalogue::all()
         .iter()
-        .map(|e| e.about().name.to_string())
+        .map(|e| e.card().name.to_string())
         .collect();
     assert_eq!(names, catalogue, "names of effects in docs/formats.md");
 }
