@@ -25,7 +25,7 @@
 //! larger part of themselves unexplained are kept first. The order decides within a factor of two.
 
 use crate::dynamics::{Samples, Tree};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::regressor::Regressor;
 use crate::robot::{Column, JointTerm, Motion, Robot};
 use faer::{Mat, MatRef};
@@ -207,6 +207,7 @@ impl BaseParameters {
         let mut warnings = Vec::new();
         if rank_gap < 1e3 {
             warnings.push(Warning::new(
+                WarningKind::RankGap,
                 "rank",
                 format!(
                     "the border between identifiable and not is blurred: singular value {rank} is \

@@ -71,9 +71,114 @@ impl Error {
     }
 }
 
+/// Declares [`WarningKind`] with the code of each kind beside it.
+macro_rules! warning_kinds {
+    ($($(#[$doc:meta])+ $name:ident = $code:literal,)+) => {
+        /// What kind of imperfection a [`Warning`] is about, for programs that filter warnings.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+        #[non_exhaustive]
+        pub enum WarningKind {
+            $($(#[$doc])+ #[serde(rename = $code)] $name,)+
+        }
+
+        impl WarningKind {
+            /// All kinds, in the order of the pipeline.
+            pub const ALL: &'static [WarningKind] = &[$(WarningKind::$name),+];
+
+            /// The code in the JSON of the reports.
+            pub fn code(self) -> &'static str {
+                match self {
+                    $(WarningKind::$name => $code,)+
+                }
+            }
+        }
+    };
+}
+
+warning_kinds! {
+    /// A limit is not stated; it is taken as unlimited, or assumed for the design.
+    LimitsMissing = "limits_missing",
+    /// Two statements of a limit contradict each other; the message says which is used.
+    LimitsContradict = "limits_contradict",
+    /// A home pose or a locked joint lies outside its limits.
+    OutsideLimits = "outside_limits",
+    /// An entry of a robot file has no effect, or is given twice.
+    EntryIgnored = "entry_ignored",
+    /// A joint follows one that does not move it, and is held fixed.
+    JointHeld = "joint_held",
+    /// A friction or drive term is negative; it is kept as written.
+    NegativeParameter = "negative_parameter",
+    /// A link has no mass or no inertia; it is taken as zero or as a point mass.
+    InertiaMissing = "inertia_missing",
+    /// No rigid body has this mass and inertia.
+    InertiaImpossible = "inertia_impossible",
+    /// An inertia was changed to fit what the file says of it, such as identical legs.
+    InertiaChanged = "inertia_changed",
+    /// A kinematic loop does not close exactly; it is closed as well as possible.
+    LoopOpen = "loop_open",
+    /// There are more actuators than freedoms; the forces of least norm are used.
+    RedundantActuation = "redundant_actuation",
+    /// The mechanism is singular at a pose.
+    Singular = "singular",
+    /// The torque noise is not stated; a share of the effort limit is taken.
+    TorqueNoiseAssumed = "torque_noise_assumed",
+    /// The border between identifiable and unidentifiable parameters is blurred.
+    RankGap = "rank_gap",
+    /// The motion excites some identifiable parameters hardly or not at all.
+    NotExcited = "not_excited",
+    /// Some parameters cannot be identified on this robot with any motion.
+    NotIdentifiable = "not_identifiable",
+    /// A limit between samples is bounded from differences, not proven.
+    BoundedNotProven = "bounded_not_proven",
+    /// The robot files are not those that the trajectory was designed with.
+    RobotChanged = "robot_changed",
+    /// Columns of a log are unknown or were not used.
+    ColumnsIgnored = "columns_ignored",
+    /// Rows of a log were left out: no, repeated or impossible time stamps, or a line that breaks off.
+    RowsLeftOut = "rows_left_out",
+    /// Samples of a channel are missing, stuck or saturated and were left out of the fit.
+    SamplesLeftOut = "samples_left_out",
+    /// Few samples of a log are sound in all channels.
+    FewSoundSamples = "few_sound_samples",
+    /// Time stamps were moved: the time jumps back, or its clock is too coarse.
+    TimeRepaired = "time_repaired",
+    /// The time has gaps; they are interpolated for filters and left out of the fit.
+    TimeGaps = "time_gaps",
+    /// Time stamps jitter; the log was resampled to an even grid.
+    Resampled = "resampled",
+    /// Numbers look as if they had another unit, sign or side of the gear.
+    UnitSuspect = "unit_suspect",
+    /// A joint does not move in a log.
+    JointNotMoving = "joint_not_moving",
+    /// The stated period does not hold, or is too short or too long for the record.
+    NotPeriodic = "not_periodic",
+    /// The first period differs from the others and was left out of the mean.
+    TransientLeftOut = "transient_left_out",
+    /// A whole record was left out.
+    RecordLeftOut = "record_left_out",
+    /// Equations of joints at rest were left out of the fit.
+    StandstillLeftOut = "standstill_left_out",
+    /// What a model leaves of one joint goes with another joint; the joints seem to be coupled.
+    JointsCoupled = "joints_coupled",
+    /// The robot file lists no joint terms; friction and offset are identified.
+    JointTermsAssumed = "joint_terms_assumed",
+    /// No record of the empty robot is there; its nominal model was subtracted.
+    NominalModelAssumed = "nominal_model_assumed",
+    /// Measured torques were divided by a gain that a known load showed.
+    DriveGainApplied = "drive_gain_applied",
+    /// An effort limit cut a simulated torque.
+    TorqueSaturated = "torque_saturated",
+    /// Simulated friction did not settle within a step.
+    FrictionChattered = "friction_chattered",
+    /// A result file could not be written; the values stand in another one.
+    FileNotWritten = "file_not_written",
+}
+
 /// Something imperfect that did not stop the work: it is printed and carried to the report.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Warning {
+    /// what kind of imperfection it is
+    pub kind: WarningKind,
     /// what it is about: a link, a joint, a file, a channel
     pub subject: String,
     /// what was found and what was assumed instead
@@ -81,9 +186,10 @@ pub struct Warning {
 }
 
 impl Warning {
-    /// A warning about `subject`.
-    pub fn new(subject: impl Into<String>, message: impl Into<String>) -> Self {
+    /// A warning of a kind about `subject`.
+    pub fn new(kind: WarningKind, subject: impl Into<String>, message: impl Into<String>) -> Self {
         Warning {
+            kind,
             subject: subject.into(),
             message: message.into(),
         }

@@ -79,6 +79,6 @@ pub mod signals;
 pub mod simulate;
 pub mod trajectory;
 
-pub use error::{Error, Result, Warning};
+pub use error::{Error, Result, Warning, WarningKind};
 pub use plant::Plant;
 pub use robot::Robot;

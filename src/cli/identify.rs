@@ -8,7 +8,7 @@ use excite::identify::{
 use excite::log::Experiment;
 use excite::output::prepare_dir;
 use excite::robot::JointTerm;
-use excite::{Error, Plant, Result, Warning};
+use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -118,7 +118,11 @@ pub fn run(args: Args) -> Result<()> {
     };
     if let Err(e) = &file {
         let message = format!("not written: {e}; the values are in model.json");
-        id.warnings.push(Warning::new("robot.toml", message));
+        id.warnings.push(Warning::new(
+            WarningKind::FileNotWritten,
+            "robot.toml",
+            message,
+        ));
     }
     warn(&id.warnings);
     let (_, verdict) = page::verdict(plant, &id);
@@ -180,7 +184,7 @@ fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> 
         Plant::Serial(robot) => {
             let none = robot.joints.iter().all(|j| !j.identify.contains(&true));
             if asked.is_none() && none {
-                notes.push(Warning::new(
+                notes.push(Warning::new(WarningKind::JointTermsAssumed,
                     &robot.name,
                     "its file lists no joint terms to identify; viscous and Coulomb friction and offset were \
                      identified for every joint (--identify none leaves them out)",

@@ -32,7 +32,7 @@ pub use settings::Settings;
 
 use crate::base::BaseParameters;
 use crate::dynamics::Tree;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::identifiability::{certificate, torque_noise};
 use crate::mechanism::{Mechanism, closed_certificate};
 use crate::plant::Plant;
@@ -115,6 +115,7 @@ pub fn with_assumed_limits(robot: &Robot) -> Robot {
         }
         if !assumed.is_empty() {
             robot.warnings.push(Warning::new(
+                WarningKind::LimitsMissing,
                 joint.name.clone(),
                 format!(
                     "limits not stated, assumed for the design: {}",
@@ -124,6 +125,7 @@ pub fn with_assumed_limits(robot: &Robot) -> Robot {
         }
         if !joint.limits.effort.is_finite() {
             robot.warnings.push(Warning::new(
+                WarningKind::LimitsMissing,
                 joint.name.clone(),
                 "no effort limit stated: its torque is not limited in the design",
             ));

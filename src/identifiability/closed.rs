@@ -2,7 +2,7 @@
 
 use super::{Assessment, Platform, sample_period};
 use crate::dynamics::Samples;
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::mechanism::{ClosedCertificate, Mechanism, closed_certificate};
 use crate::plant::Plant;
 use crate::trajectory::certificate::{Certificate, Kind, Worst};
@@ -23,6 +23,7 @@ pub(super) fn assess(
     let closed = closed_certificate(mechanism, &trajectory.fourier, 1.0)?;
     if !closed.proven {
         all.warnings.push(Warning::new(
+            WarningKind::BoundedNotProven,
             "limits",
             "this mechanism has no closed-form kinematics: what its actuators do between the \
              samples is bounded by twice the largest second difference, not proven",
@@ -50,6 +51,7 @@ fn unexcited(a: &Assessment) -> Option<Warning> {
     let condition = a.excitation.as_ref()?.condition;
     (condition.normalised > 1e6).then(|| {
         Warning::new(
+            WarningKind::NotExcited,
             "trajectory",
             format!(
                 "it does not excite every base parameter: the condition number with unit columns \

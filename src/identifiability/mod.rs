@@ -17,7 +17,7 @@ pub mod page;
 
 use crate::base::BaseParameters;
 use crate::dynamics::{Samples, Tree};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::mechanism::{ClosedCertificate, PoseUse, Segment, Task};
 use crate::plant::Plant;
 use crate::regressor::{Regressor, nominal_torque};
@@ -149,6 +149,7 @@ pub fn torque_noise(robot: &Robot) -> (Vec<f64>, Vec<Warning>) {
         vec![]
     } else {
         vec![Warning::new(
+            WarningKind::TorqueNoiseAssumed,
             "torque_noise",
             format!(
                 "not stated for {}: taken as {} % of the effort limit; state `torque_noise` for \
@@ -249,6 +250,7 @@ impl Assessment {
         );
         if condition.invariant > 1e7 && platform.is_none() {
             self.warnings.push(Warning::new(
+                WarningKind::NotExcited,
                 "trajectory",
                 format!(
                     "it does not excite every base parameter: the condition number is {:.1e}",

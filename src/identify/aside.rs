@@ -10,7 +10,7 @@
 
 use super::stack::Stack;
 use super::validation::{Trace, followers};
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::signals::Prepared;
 
@@ -89,7 +89,7 @@ pub fn apart(
     let notes = found
         .iter()
         .map(|f| {
-            Warning::new(
+            Warning::new(WarningKind::JointsCoupled,
                 &names[f.actuator],
                 format!(
                     "{:.0} % of what the model left of its torque goes with {}: the joints seem to be coupled. That \

@@ -20,7 +20,7 @@
 //! steps solve it to machine precision. [`super::lmi`] solves the same problem as a semidefinite
 //! program where the distance is quadratic.
 
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::{Inertia, JointTerm};
 use faer::{Mat, MatRef, Side};
@@ -115,7 +115,7 @@ impl Prior {
             let ten: [f64; 10] = std::array::from_fn(|k| unknowns[k].map_or(0.0, |u| phi[u]));
             let (nominal, changed) = definite(Inertia(ten).pseudo_inertia());
             if changed {
-                prior.warnings.push(Warning::new(
+                prior.warnings.push(Warning::new(WarningKind::InertiaImpossible,
                     name.clone(),
                     "its nominal inertia is not that of a body that can exist; the nearest that can was \
                      taken for the prior",

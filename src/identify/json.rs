@@ -1,7 +1,6 @@
 //! `report.json` and `model.json`.
 
 use super::{Identification, Settings};
-use crate::error::Warning;
 use crate::plant::{Kind, Plant};
 use serde_json::{Value, json};
 
@@ -132,7 +131,7 @@ pub fn report(
         "variance_inflation": number(id.inflation),
         "outliers": id.outliers,
         "records": records(id),
-        "warnings": id.warnings.iter().map(Warning::to_string).collect::<Vec<_>>(),
+        "warnings": id.warnings,
         "seconds": seconds,
     })
 }

@@ -29,7 +29,7 @@ pub mod validation;
 pub mod weights;
 
 use crate::base::BaseParameters;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Payload, Purpose, Record};
 use crate::plant::Plant;
 use crate::signals::{self, Prepared};
@@ -157,7 +157,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
     warnings.extend(records.iter().flat_map(|r| r.warnings.clone()));
     for r in records {
         if r.payload != Payload::None {
-            warnings.push(Warning::new(
+            warnings.push(Warning::new(WarningKind::RecordLeftOut,
                 r.path.display().to_string(),
                 "it was recorded with a payload and is left out here; `excite load` identifies payloads",
             ));
@@ -249,7 +249,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
     let solution = linear::solve(whole.as_ref())?;
     if !solution.weak.is_empty() {
         let names: Vec<&str> = solution.weak.iter().map(|&k| base.name(k)).collect();
-        warnings.push(Warning::new(
+        warnings.push(Warning::new(WarningKind::NotExcited,
             "information",
             format!(
                 "the motion says nothing of some combinations of {}: they keep their nominal values; \

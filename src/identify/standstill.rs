@@ -7,7 +7,7 @@
 //! sees, its equation is left out; those of the other joints stay. A reversal passes in less and is kept.
 
 use super::stack::Stack;
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::JointTerm;
 use crate::signals::Prepared;
@@ -66,6 +66,7 @@ pub fn left_out(
         return Ok((None, None));
     }
     let note = Warning::new(
+        WarningKind::StandstillLeftOut,
         "standstill",
         format!(
             "equations of joints that stand still were left out of the fit, because friction at rest can have any \

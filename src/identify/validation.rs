@@ -3,7 +3,7 @@
 use super::Settings;
 use super::stack::Stack;
 use crate::base::BaseParameters;
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::log::{Purpose, Record};
 use crate::plant::Plant;
 use crate::signals::{self, Prepared};
@@ -292,7 +292,7 @@ pub fn unit_suspicions(plant: &Plant, base: &BaseParameters, fit: &[&Stack]) -> 
             ),
             _ => continue,
         };
-        out.push(Warning::new(&joint.name, message));
+        out.push(Warning::new(WarningKind::UnitSuspect, &joint.name, message));
     }
     out
 }

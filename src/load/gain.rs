@@ -16,7 +16,7 @@ use super::Loaded;
 use super::body::from_quantities;
 use super::system::System;
 use super::weight::inflation;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Payload;
 use crate::plant::Plant;
 use faer::Mat;
@@ -199,6 +199,7 @@ pub fn estimate(plant: &Plant, tool: usize, records: &[Loaded]) -> Result<Gains>
         .filter(|&j| corrected[j])
         .map(|j| {
             Warning::new(
+                WarningKind::DriveGainApplied,
                 joints[j].clone(),
                 format!(
                     "measured torques are {:.3} ± {:.3} times what the known load tells; they were \

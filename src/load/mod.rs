@@ -40,7 +40,7 @@ pub mod weight;
 
 pub use body::LoadBody;
 
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Experiment, Payload, Record};
 use crate::plant::Plant;
 use crate::signals::{self, Prepared};
@@ -250,6 +250,7 @@ pub fn from_records(
     };
     if !records.iter().any(|r| r.payload == Payload::None) {
         warnings.push(Warning::new(
+            WarningKind::NominalModelAssumed,
             "payload",
             "there is no record of the empty robot: its nominal model was subtracted, and every \
              error of that is booked on the load",

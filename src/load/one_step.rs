@@ -4,7 +4,7 @@ use super::body::LoadBody;
 use super::system::{Part, System};
 use super::weight::{Spread, inflation};
 use super::{Loaded, Parameters, Settings};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Payload;
 use crate::plant::Plant;
 use crate::robot::Inertia;
@@ -432,6 +432,7 @@ pub fn estimate(
     let mut warnings = Vec::new();
     if !unknown.is_empty() {
         warnings.push(Warning::new(
+            WarningKind::NotIdentifiable,
             "load",
             format!(
                 "this robot cannot tell all ten parameters: {}",
@@ -441,6 +442,7 @@ pub fn estimate(
     }
     if condition > 1e4 {
         warnings.push(Warning::new(
+            WarningKind::NotExcited,
             "load",
             format!(
                 "the motion hardly excites the load (condition number {condition:.1e}): turn the \
@@ -452,6 +454,7 @@ pub fn estimate(
     let load = LoadBody::new(Inertia(phi), c10, known, consistent)?;
     if load.projected {
         warnings.push(Warning::new(
+            WarningKind::InertiaImpossible,
             "load",
             "the estimate itself is no body that can exist; the nearest one is given",
         ));
@@ -460,6 +463,7 @@ pub fn estimate(
         && !load.consistent
     {
         warnings.push(Warning::new(
+            WarningKind::InertiaImpossible,
             "load",
             "the estimate is no body that can exist: its inertia is not known well enough",
         ));

@@ -1,7 +1,7 @@
 //! Channels that cannot be what was measured: saturated, stuck, dropped, in other units.
 
 use super::clock::median;
-use crate::error::Warning;
+use crate::error::{Warning, WarningKind};
 use crate::robot::{Joint, Motion};
 use std::f64::consts::PI;
 
@@ -161,6 +161,7 @@ pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
     }
     let text = |why: &str| {
         Some(Warning::new(
+            WarningKind::UnitSuspect,
             &joint.name,
             format!("its positions go from {low:.3} to {high:.3}, {why}"),
         ))

@@ -9,7 +9,7 @@
 //! | jitter | resampling to an even grid |
 //! | a gap | interpolated over so that filters run through, but marked as not measured |
 
-use crate::error::Warning;
+use crate::error::{Warning, WarningKind};
 
 /// Stamps after repair.
 #[derive(Debug, Clone, Default)]
@@ -63,7 +63,7 @@ fn counter(jump: f64) -> Option<&'static str> {
 /// Looks through the stamps `raw` of the log called `subject`.
 pub fn repair(raw: &[f64], subject: &str) -> Clock {
     let mut out = Clock::default();
-    let mut warn = |message: String| out.warnings.push(Warning::new(subject, message));
+    let mut warn = |kind, message: String| out.warnings.push(Warning::new(kind, subject, message));
     let steps = || raw.windows(2).map(|w| w[1] - w[0]);
     let usual = median(steps().filter(|d| *d > 0.0));
     if !usual.is_finite() {
@@ -110,33 +110,44 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
         t.push(now);
     }
     if lost > 0 {
-        warn(format!("{lost} rows have no time stamp and were left out"));
+        warn(
+            WarningKind::RowsLeftOut,
+            format!("{lost} rows have no time stamp and were left out"),
+        );
     }
     if wraps > 0 {
         let more = match wraps {
             1 => String::new(),
             n => format!(" (and {} times more)", n - 1),
         };
-        warn(format!(
-            "the time jumps back {wrap_text}{more}; the stamps after it were moved to follow by one step"
-        ));
+        warn(
+            WarningKind::TimeRepaired,
+            format!(
+                "the time jumps back {wrap_text}{more}; the stamps after it were moved to follow by one step"
+            ),
+        );
     }
     if twice > 0 {
-        warn(format!(
-            "{twice} time stamps repeat the one before; those rows were left out"
-        ));
+        warn(
+            WarningKind::RowsLeftOut,
+            format!("{twice} time stamps repeat the one before; those rows were left out"),
+        );
     }
     if back > 0 {
-        warn(format!(
-            "{back} time stamps are earlier than the one before; those rows were left out"
-        ));
+        warn(
+            WarningKind::RowsLeftOut,
+            format!("{back} time stamps are earlier than the one before; those rows were left out"),
+        );
     }
     if coarse && t.len() > 1 {
-        warn(format!(
-            "{same} of {} time stamps equal the one before: the clock is coarser than the sampling; \
+        warn(
+            WarningKind::TimeRepaired,
+            format!(
+                "{same} of {} time stamps equal the one before: the clock is coarser than the sampling; \
              the stamps were spread evenly",
-            raw.len()
-        ));
+                raw.len()
+            ),
+        );
         let (a, b, n) = (t[0], t[t.len() - 1], t.len() - 1);
         t.iter_mut()
             .enumerate()
@@ -144,10 +155,13 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
     }
     let step = median(t.windows(2).map(|w| w[1] - w[0]));
     if step >= 0.5 {
-        warn(format!(
-            "the usual step of the time is {step:.4}: is it in milliseconds or microseconds? \
+        warn(
+            WarningKind::UnitSuspect,
+            format!(
+                "the usual step of the time is {step:.4}: is it in milliseconds or microseconds? \
              Seconds are expected"
-        ));
+            ),
+        );
     }
     let mut missing = 0.0;
     for w in t.windows(2) {
@@ -164,7 +178,8 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
              are interpolated for the filters and left out of the fit",
             out.gaps.len()
         );
-        out.warnings.push(Warning::new(subject, warning));
+        out.warnings
+            .push(Warning::new(WarningKind::TimeGaps, subject, warning));
     }
     // even: against the line from first to last stamp; a grid with gaps is not
     if let [first, .., last] = t[..] {
@@ -189,6 +204,7 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
                 .sqrt();
             if rms > 0.01 * step {
                 out.warnings.push(Warning::new(
+                    WarningKind::Resampled,
                     subject,
                     format!(
                         "the time stamps jitter by {:.1} % of the usual step of {step:.6} s (rms); \

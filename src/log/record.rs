@@ -3,7 +3,7 @@
 use super::clock::{self, Clock};
 use super::resample::{Order, fill, interpolate};
 use super::{Payload, Purpose, Record, Table, channels};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::Joint;
 use rayon::prelude::*;
@@ -92,6 +92,7 @@ fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warn
     Ok(match unknown.is_empty() {
         true => Vec::new(),
         false => vec![Warning::new(
+            WarningKind::ColumnsIgnored,
             path.display().to_string(),
             format!(
                 "columns that are not known were left alone: {}",
@@ -224,7 +225,7 @@ impl Record {
             for &i in &holes {
                 valid[i] = false;
             }
-            warnings.push(Warning::new(
+            warnings.push(Warning::new(WarningKind::SamplesLeftOut,
                 format!("{}: {name}", path.display()),
                 format!(
                     "{} of {} values were dropped, the first at {:.4} s; interpolated for the filters and \
@@ -261,6 +262,7 @@ impl Record {
         }
         for &j in &still {
             self.warnings.push(Warning::new(
+                WarningKind::JointNotMoving,
                 format!("{subject}: q{}", j + 1),
                 format!(
                     "{} does not move; only what the others show of it can be identified",
@@ -279,7 +281,7 @@ impl Record {
                 if let Some((count, level)) =
                     channels::saturated(tau, joint.limits.effort, &mut self.valid)
                 {
-                    self.warnings.push(Warning::new(
+                    self.warnings.push(Warning::new(WarningKind::SamplesLeftOut,
                         name.clone(),
                         format!(
                             "it stands at {level:.6} for {count} samples as a saturated channel does; they \
@@ -303,6 +305,7 @@ impl Record {
         let bad = self.valid.iter().filter(|v| !**v).count();
         if 2 * bad > self.valid.len() {
             self.warnings.push(Warning::new(
+                WarningKind::FewSoundSamples,
                 subject,
                 format!(
                     "only {} of {} samples are sound in all channels",
@@ -319,7 +322,7 @@ impl Record {
         let Some(period) = self.period.filter(|p| *p < SHORTEST * step) else {
             return;
         };
-        self.warnings.push(Warning::new(
+        self.warnings.push(Warning::new(WarningKind::NotPeriodic,
             self.path.display().to_string(),
             format!(
                 "the stated period of {period} s is shorter than {SHORTEST} samples ({step:.6} s each): it is \
@@ -378,6 +381,7 @@ impl Record {
         let period = self.period.unwrap_or_default();
         if count < 2 {
             self.warnings.push(Warning::new(
+                WarningKind::NotPeriodic,
                 subject,
                 format!(
                     "it is {:.3} s long, less than two periods of {period} s: nothing to average",
@@ -401,7 +405,7 @@ impl Record {
             motion += q.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
         }
         if scatter > 0.02 * motion {
-            self.warnings.push(Warning::new(
+            self.warnings.push(Warning::new(WarningKind::NotPeriodic,
                 subject,
                 format!(
                     "the motion does not repeat after the stated period of {period} s (scatter {:.0} % of \
@@ -416,6 +420,7 @@ impl Record {
 
 fn stuck(name: String, (runs, samples, first): (usize, usize, usize), step: f64) -> Warning {
     Warning::new(
+        WarningKind::SamplesLeftOut,
         name,
         format!(
             "it stands still {runs} times, {samples} samples in all, while the robot moves (first at \

@@ -5,7 +5,7 @@
 //! file.
 
 use super::number;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use rayon::prelude::*;
 use std::io::Read;
 use std::path::Path;
@@ -143,6 +143,7 @@ impl Table {
                 // a recording that was cut in the middle of its last line
                 if cut_off && k == last && bad.last {
                     self.warnings.push(Warning::new(
+                        WarningKind::RowsLeftOut,
                         path.display().to_string(),
                         format!("line {at} breaks off at the end of the file; it was left out"),
                     ));

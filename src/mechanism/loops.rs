@@ -26,7 +26,7 @@ pub use closure::{Closure, Coincide, Frame};
 use super::parameters::{Group, Pattern};
 use super::{Mechanism, Setup, Task};
 use crate::dynamics::Tree;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Motion, Robot};
 use closure::Chain;
 use nalgebra::{DMatrix, DVector};
@@ -102,6 +102,7 @@ impl Loops {
         let (open, which) = chain.open(&home);
         if open > 1e-9 * chain.length {
             warnings.push(Warning::new(
+                WarningKind::LoopOpen,
                 format!("loop {which}"),
                 format!(
                     "it stays open by {open:.1e} m: its closure asks for more than the axes of \

@@ -51,7 +51,7 @@ pub use singularity::{SINGULAR, Singularity, Spread};
 pub use task::{PlatformMotion, Task};
 
 use crate::dynamics::{Samples, Tree};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
 use std::sync::Arc;
 
@@ -166,6 +166,7 @@ impl Mechanism {
         let (parameters, mut warnings) = Parameters::new(&mut robot, &groups);
         if actuated.len() > freedoms {
             warnings.push(Warning::new(
+                WarningKind::RedundantActuation,
                 "actuators",
                 format!(
                     "{} actuators for {freedoms} freedoms: the forces are not unique; those of \

@@ -4,7 +4,7 @@
 //! `Ixx = Iyy` of a body of revolution, or one and the same parameter of six identical legs. With
 //! `E` (raw columns × parameters): `Y = Y_raw E`, `φ_raw = E φ`.
 
-use crate::error::Warning;
+use crate::error::{Warning, WarningKind};
 use crate::robot::{JointTerm, Robot, inertia};
 
 /// Which of the ten parameters of a body are unknowns.
@@ -150,7 +150,7 @@ impl Parameters {
                 let off =
                     (0..10).fold(0.0f64, |m, k| m.max((before[i].0[k] - after[i].0[k]).abs()));
                 if off > 1e-9 * size {
-                    warnings.push(Warning::new(
+                    warnings.push(Warning::new(WarningKind::InertiaChanged,
                         robot.bodies[body].name.clone(),
                         format!(
                             "its inertia does not fit what the file says of it (shared by identical \

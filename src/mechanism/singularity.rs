@@ -14,7 +14,7 @@
 use super::Mechanism;
 use super::task::{Task, rates_to_omega};
 use crate::dynamics::Samples;
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::robot::Motion;
 use nalgebra::{DMatrix, Vector3};
 
@@ -82,7 +82,7 @@ impl Singularity {
     pub fn warnings(&self, name: &str, place: &str) -> Vec<Warning> {
         let mut all = Vec::new();
         if self.actuation.is_singular() {
-            all.push(Warning::new(
+            all.push(Warning::new(WarningKind::Singular,
                 name,
                 format!(
                     "singular {place}: the actuators do not hold the platform (actuation Jacobian \
@@ -94,7 +94,7 @@ impl Singularity {
             ));
         }
         if let Some(c) = self.constraint.filter(Spread::is_singular) {
-            all.push(Warning::new(
+            all.push(Warning::new(WarningKind::Singular,
                 name,
                 format!(
                     "singular {place}: the passive joints do not hold the platform's other \

@@ -6,7 +6,7 @@ mod template;
 
 use super::urdf::{Options, Urdf};
 use super::{Prior, Robot, bundled};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::mechanism;
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -398,6 +398,7 @@ fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
                 joint_values(source, entry, &what, joint, warnings)?;
             }
             None => robot.warnings.push(Warning::new(
+                WarningKind::EntryIgnored,
                 what,
                 "it is locked; its [[joint]] entry has no effect",
             )),

@@ -3,7 +3,7 @@
 use super::butterworth::{Butterworth, first_derivative, second_derivative};
 use super::{Decimator, Periods, Prepared, Settings, cutoff, fourier, platform};
 use crate::dynamics::Samples;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Record;
 use crate::plant::Plant;
 use faer::Mat;
@@ -170,7 +170,7 @@ impl Prepared {
     ) -> Result<Prepared> {
         let mut warnings = Vec::new();
         if record.dq.is_some() && settings.measured_rates {
-            warnings.push(Warning::new(
+            warnings.push(Warning::new(WarningKind::ColumnsIgnored,
                 record.path.display().to_string(),
                 "its measured velocities (dq1…) were not used: the mean of the periods is differentiated in \
                  the frequency domain; without `period` in the experiment the record is taken as it is, with them",
@@ -182,7 +182,7 @@ impl Prepared {
         let mut from = record.len() - samples * count;
         let mut count = count;
         if count > 2 && transient(&record.q, from, samples, count) {
-            warnings.push(Warning::new(
+            warnings.push(Warning::new(WarningKind::TransientLeftOut,
                 record.path.display().to_string(),
                 "the first period differs from the others by more than they do among themselves; it was \
                  left out of the mean",

@@ -38,7 +38,7 @@ pub use dynamics::{Dynamics, Terms};
 pub use effects::{Effects, Field};
 
 use crate::dynamics::Samples;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::trajectory::Fourier;
 use control::Tracker;
@@ -519,6 +519,7 @@ pub fn simulate(
     run.reference = reference(plant, fourier, start, &run.t)?;
     if saturated > 0 {
         run.warnings.push(Warning::new(
+            WarningKind::TorqueSaturated,
             plant.name(),
             format!(
                 "an effort limit cut the torque in {:.2} % of the steps",
@@ -528,6 +529,7 @@ pub fn simulate(
     }
     if simulator.unsettled > 0 {
         run.warnings.push(Warning::new(
+            WarningKind::FrictionChattered,
             plant.name(),
             format!(
                 "friction chattered in {} of {steps} steps; a smaller --step resolves it",

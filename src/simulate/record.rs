@@ -1,7 +1,7 @@
 //! What the sensors make of a run, and the log that is written.
 
 use super::{Effects, Run};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Payload, Purpose, Record};
 use crate::output::write_atomic;
 use crate::plant::Plant;
@@ -51,6 +51,7 @@ impl Sensors {
         let warnings = match missing.is_empty() || scale == 0.0 {
             true => vec![],
             false => vec![Warning::new(
+                WarningKind::TorqueNoiseAssumed,
                 "torque_noise",
                 format!(
                     "not stated for {}: simulated as {} % of the effort limit",

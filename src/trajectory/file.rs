@@ -15,7 +15,7 @@
 use super::basis::Ends;
 use super::fourier::{Fourier, Series};
 use super::grid::Grid;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::output::write_atomic;
 use crate::robot::Robot;
 use std::path::Path;
@@ -265,6 +265,7 @@ impl Trajectory {
         let changed = !self.robot_hash.is_empty() && self.robot_hash != robot.hash;
         Ok(changed.then(|| {
             Warning::new(
+                WarningKind::RobotChanged,
                 &robot.name,
                 "the robot's files are not those the trajectory was designed with; limits are \
                  judged by the present ones",

@@ -5,7 +5,7 @@
 
 use super::fourier::Fourier;
 use super::samples::{Samples, times};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Limits, Robot};
 use rsruckig::prelude::{
     DataArrayOrVec, InputParameter, Ruckig, RuckigResult, Synchronization, ThrowErrorHandler,
@@ -186,7 +186,7 @@ fn assumed(name: &str, mut limits: Limits, warnings: &mut Vec<Warning>) -> Resul
             let message = format!(
                 "has no {what} limit; {default} is assumed for the move to and from the start"
             );
-            warnings.push(Warning::new(name, message));
+            warnings.push(Warning::new(WarningKind::LimitsMissing, name, message));
         }
     };
     assume(

@@ -192,12 +192,18 @@ fn a_urdf_from_the_wild() {
     let out = t.run("identifiability wild.urdf --output r");
     assert_eq!(out.status, 0, "{}", out.stderr);
     assert!(out.stderr.contains("warning"), "{}", out.stderr);
-    assert!(
-        !t.json("r/report.json")["warnings"]
-            .as_array()
-            .unwrap()
-            .is_empty()
-    );
+    let report = t.json("r/report.json");
+    let warnings = report["warnings"].as_array().unwrap();
+    for kind in ["limits_missing", "inertia_missing", "torque_noise_assumed"] {
+        assert!(
+            warnings.iter().any(|w| w["kind"] == kind),
+            "{kind}: {warnings:#?}"
+        );
+    }
+    let whole = |w: &serde_json::Value| {
+        w["kind"].is_string() && w["subject"].is_string() && w["message"].is_string()
+    };
+    assert!(warnings.iter().all(whole), "{warnings:#?}");
     let out = t.run("design wild.urdf --starts 1 --output d");
     assert_eq!(out.status, 0, "{}", out.stderr);
     assert!(out.stderr.contains("assumed"), "{}", out.stderr);
@@ -502,4 +508,19 @@ fn series_of_the_actuators_are_designed_judged_and_simulated() {
         1,
         &["trajectory.json", "motor1", "delta"],
     );
+}
+
+/// The table of warnings in the documents is the list in the code.
+#[test]
+fn every_kind_of_warning_is_documented() {
+    let text = include_str!("../docs/formats.md");
+    let table = text.split("## Warnings").nth(1).unwrap();
+    let table = table.split("\n## ").next().unwrap();
+    let written: Vec<&str> = table
+        .lines()
+        .filter_map(|l| l.strip_prefix("| `")?.split('`').next())
+        .filter(|code| *code != "kind")
+        .collect();
+    let codes: Vec<&str> = excite::WarningKind::ALL.iter().map(|k| k.code()).collect();
+    assert_eq!(written, codes);
 }

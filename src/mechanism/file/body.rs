@@ -1,6 +1,6 @@
 //! Bodies and checked numbers of a mechanism's file.
 
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::robot::Inertia;
 use crate::robot::file::Text;
 use nalgebra::{Matrix3, Vector3};
@@ -74,6 +74,7 @@ pub(super) fn inertia(
     };
     if smallest < -1e-9 || triangle > 1e-9 {
         warnings.push(Warning::new(
+            WarningKind::InertiaImpossible,
             what,
             format!(
                 "no body has this inertia: smallest principal moment {smallest:.1e} of the \

@@ -1,7 +1,7 @@
 //! What the files of all mechanisms share: name, gravity, home, workspace, actuators and joints.
 
 use super::body::{finite, numbers, positive, vector};
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::mechanism::{Mechanism, Setup, Task};
 use crate::robot::file::joint::{JointEntry, joint_values, stated_limits};
 use crate::robot::file::names::{did_you_mean, listed};
@@ -318,6 +318,7 @@ impl Head<'_> {
             .find(|u| u.used() > 1.0)
         {
             mechanism.warnings.push(Warning::new(
+                WarningKind::OutsideLimits,
                 u.name.clone(),
                 format!(
                     "at home already beyond its limit: {:.4} where {:.4} is allowed; no design \

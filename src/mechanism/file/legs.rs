@@ -2,7 +2,7 @@
 
 use super::body::{BodyEntry, Ring, numbers, vector};
 use super::common::{identified, mechanism_file, optional};
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::mechanism::Mechanism;
 use crate::mechanism::gough_stewart::{Bodies, GoughStewart, Leg, joint_frame};
 use crate::mechanism::task::rotation;
@@ -189,6 +189,7 @@ fn check_lengths(
         let [low, high] = leg.limits.position;
         if q < low || q > high {
             warnings.push(Warning::new(
+                WarningKind::OutsideLimits,
                 format!("leg{}", i + 1),
                 format!(
                     "home lies outside its stroke: it would read {q:.4} m, its limits are \

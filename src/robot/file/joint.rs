@@ -1,7 +1,7 @@
 //! One `[[joint]]` of a `robot.toml`.
 
 use super::Text;
-use crate::error::{Result, Warning};
+use crate::error::{Result, Warning, WarningKind};
 use crate::robot::urdf::StatedLimits;
 use crate::robot::{Joint, JointTerm};
 use serde::Deserialize;
@@ -153,6 +153,7 @@ pub(crate) fn joint_values(
         }
         if value < 0.0 && term != JointTerm::Offset {
             warnings.push(Warning::new(
+                WarningKind::NegativeParameter,
                 what,
                 format!("{} = {value} is negative; kept as written", term.name()),
             ));

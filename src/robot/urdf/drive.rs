@@ -1,7 +1,7 @@
 //! What moves each joint: itself, another joint that it mimics, or nothing.
 
 use super::{Kind, Options, Urdf};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use std::collections::HashMap;
 
 /// What moves a joint.
@@ -105,6 +105,7 @@ pub(super) fn drives(
             }
             if let Drive::Held(q) = drive {
                 warnings.push(Warning::new(
+                    WarningKind::JointHeld,
                     format!("joint `{}`", joint.name),
                     format!(
                         "`{}`, which it mimics, does not move it; held at {q}",
@@ -134,6 +135,7 @@ fn own_drive(
         (Kind::Fixed, None) => Ok(Some(Drive::Held(0.0))),
         (Kind::Fixed, Some(_)) => {
             warnings.push(Warning::new(
+                WarningKind::EntryIgnored,
                 what(),
                 "it is fixed in the URDF; its `lock` has no effect",
             ));
@@ -167,6 +169,7 @@ fn own_drive(
                 && !(lower..=upper).contains(&q)
             {
                 warnings.push(Warning::new(
+                    WarningKind::OutsideLimits,
                     what(),
                     format!("locked at {q}, outside its limits {lower} to {upper}"),
                 ));

@@ -1,7 +1,7 @@
 //! Limits of a coordinate from `<limit>`, what `robot.toml` states instead, and its mimics.
 
 use super::{Kind, StatedLimits, UrdfJoint};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Limits;
 use std::path::Path;
 
@@ -43,6 +43,7 @@ pub(super) fn of_joint(
                 if ends.0.is_none() || ends.1.is_none() {
                     let end = if ends.0.is_none() { "lower" } else { "upper" };
                     warnings.push(Warning::new(
+                        WarningKind::LimitsMissing,
                         &what,
                         format!("<limit> has no {end} position; taken as 0, as URDF defines"),
                     ));
@@ -76,6 +77,7 @@ pub(super) fn of_joint(
     }
     if !missing.is_empty() {
         warnings.push(Warning::new(
+            WarningKind::LimitsMissing,
             &what,
             format!(
                 "no limit of {} in the URDF (absent or 0); taken as unlimited, \
@@ -119,6 +121,7 @@ pub(super) fn narrow(
         limits.position = [lower, upper];
     } else {
         warnings.push(Warning::new(
+            WarningKind::LimitsContradict,
             format!("joint `{}`", follower.name),
             format!(
                 "its position limits contradict those of `{leader}`, which it mimics; \

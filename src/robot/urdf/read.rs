@@ -1,7 +1,7 @@
 //! XML to links and joints.
 
 use super::{Kind, Limit, Link, Mimic, Urdf, UrdfJoint};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Inertia;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use roxmltree::{Document, Node};
@@ -138,6 +138,7 @@ fn child<'a, 'd>(
     let first = found.next();
     if found.next().is_some() {
         warnings.push(Warning::new(
+            WarningKind::EntryIgnored,
             what,
             format!("<{tag}> is given twice; the first is used"),
         ));
@@ -283,7 +284,7 @@ fn inertial_parameters(
     what: &str,
     warnings: &mut Vec<Warning>,
 ) -> Result<Inertia> {
-    let mut warn = |message: String| warnings.push(Warning::new(what, message));
+    let mut warn = |kind, message: String| warnings.push(Warning::new(kind, what, message));
     let mut again = Vec::new();
     let (rotation, com) = source.origin(child(node, "origin", what, &mut again), what)?;
     let mass = match child(node, "mass", what, &mut again) {
@@ -291,7 +292,10 @@ fn inertial_parameters(
         None => None,
     };
     if mass.is_none() {
-        warn("<inertial> has no <mass value=…>; taken as 0".to_string());
+        warn(
+            WarningKind::InertiaMissing,
+            "<inertial> has no <mass value=…>; taken as 0".to_string(),
+        );
     }
     let mass = mass.unwrap_or(0.0);
     let mut entries = [0.0; 6];
@@ -305,7 +309,10 @@ fn inertial_parameters(
             }
         }
         if !absent.is_empty() {
-            warn(format!("<inertia> lacks {}; taken as 0", absent.join(", ")));
+            warn(
+                WarningKind::InertiaMissing,
+                format!("<inertia> lacks {}; taken as 0", absent.join(", ")),
+            );
         }
     }
     let [xx, xy, xz, yy, yz, zz] = entries;
@@ -319,31 +326,44 @@ fn inertial_parameters(
         ));
     }
     if mass < 0.0 {
-        warn(format!("its mass is {mass} kg; a body has a positive mass"));
+        warn(
+            WarningKind::InertiaImpossible,
+            format!("its mass is {mass} kg; a body has a positive mass"),
+        );
     }
     if entries == [0.0; 6] {
         if mass != 0.0 {
-            warn(format!(
-                "a mass of {mass} kg but no inertia tensor; taken as a point mass"
-            ));
+            warn(
+                WarningKind::InertiaMissing,
+                format!("a mass of {mass} kg but no inertia tensor; taken as a point mass"),
+            );
         }
     } else if mass == 0.0 {
-        warn("an inertia tensor but no mass; such a body cannot exist".to_string());
+        warn(
+            WarningKind::InertiaImpossible,
+            "an inertia tensor but no mass; such a body cannot exist".to_string(),
+        );
     } else {
         // about the centre of mass as written, so that a distant origin does not blur it
         let (smallest, triangle) = Inertia::from_com(1.0, Vector3::zeros(), tensor).realizability();
         if smallest < -EIGENVALUE_TOLERANCE {
-            warn(format!(
-                "its inertia tensor has a negative principal moment ({:.2} of the largest); \
+            warn(
+                WarningKind::InertiaImpossible,
+                format!(
+                    "its inertia tensor has a negative principal moment ({:.2} of the largest); \
                  such a body cannot exist",
-                smallest
-            ));
+                    smallest
+                ),
+            );
         } else if triangle > TRIANGLE_TOLERANCE {
-            warn(format!(
-                "its largest principal moment exceeds the sum of the others by {:.1} %; \
+            warn(
+                WarningKind::InertiaImpossible,
+                format!(
+                    "its largest principal moment exceeds the sum of the others by {:.1} %; \
                  such a body cannot exist",
-                100.0 * triangle
-            ));
+                    100.0 * triangle
+                ),
+            );
         }
     }
     warnings.append(&mut again);
@@ -441,6 +461,7 @@ fn joint(
         friction = source.number(d, "friction", what)?.unwrap_or(0.0);
         if damping < 0.0 || friction < 0.0 {
             warnings.push(Warning::new(
+                WarningKind::NegativeParameter,
                 what,
                 "negative damping or friction in <dynamics>; kept as written",
             ));

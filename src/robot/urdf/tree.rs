@@ -2,7 +2,7 @@
 
 use super::drive::{Drive, drives};
 use super::{Kind, MAX_MOVING_JOINTS, Options, StatedLimits, Urdf, UrdfJoint, limits};
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Body, Joint, Motion, Prior, Robot};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use std::collections::HashMap;
@@ -346,6 +346,7 @@ fn bodies(
                 "no <inertial>"
             };
             warnings.push(Warning::new(
+                WarningKind::InertiaMissing,
                 format!("link `{}`", body.name),
                 format!("{found}; the nominal model takes it as massless"),
             ));
