@@ -34,23 +34,15 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Design an exciting trajectory and report on it before the run
+    // what each does stands at its `Args`: a comment here would replace the long help there
     Design(design::Args),
-    /// Report what a robot, and a trajectory on it, can identify
     Identifiability(identifiability::Args),
-    /// Identify the model from recorded runs
     Identify(identify::Args),
-    /// Print the inverse dynamics of a sampled motion
     Torque(torque::Args),
-    /// Diagnose the gap between a model and its robot
     Diagnose(diagnose::Args),
-    /// Rehearse an experiment: simulate the robot and write a log
     Simulate(simulate::Args),
-    /// Identify the load that a robot carries
     Load(load::Args),
-    /// List the bundled robots
     Robots(robots::Args),
-    /// Print a commented robot.toml for a URDF
     New(new::Args),
 }
 

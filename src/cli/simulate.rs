@@ -23,12 +23,13 @@ use std::path::{Path, PathBuf};
                   qref1…) that every command reads which reads logs of the real robot.\n\nFriction \
                   sticks and slides exactly; the integrator is a Runge-Kutta method of fourth order \
                   whose steps are cut where a joint stops. The controller is continuous and knows \
-                  the nominal model only.\n\nAn effect `[JOINT=]VALUE` without a joint is meant for \
-                  all actuators; the option can be given several times.",
+                  the nominal model only.\n\nEffects have the names of the catalogue of `excite diagnose`. \
+                  An effect `[JOINT=]VALUE` without a joint is meant for all actuators; the option can \
+                  be given several times.",
     after_help = "Examples:\n  excite simulate panda out/trajectory.json --output fit.csv\n  excite \
                   simulate panda out/trajectory.json --output fit.csv --experiment experiment.toml\n  \
                   excite simulate hexapod out/trajectory.json --output loaded.csv \\\n      --payload \
-                  22.26,0.03,-0.02,0.12,0.26,0.012,-0.02,0.29,0.015,0.33 --stribeck 15,0.01\n  excite \
+                  22.26,0.03,-0.02,0.12,0.26,0.012,-0.02,0.29,0.015,0.33 --stribeck-friction 15,0.01\n  excite \
                   simulate ur5e out/trajectory.json --output log.csv --monte-carlo 100"
 )]
 pub struct Args {
@@ -94,28 +95,28 @@ pub struct Args {
     /// Stribeck friction: breakaway force beyond Coulomb friction, N m or N, and velocity at which
     /// it has fallen to 1/e, rad/s or m/s
     #[arg(long, value_name = "[JOINT=]EXTRA,VELOCITY")]
-    stribeck: Vec<String>,
+    stribeck_friction: Vec<String>,
     /// Friction C v |v|
     #[arg(long, value_name = "[JOINT=]C")]
-    quadratic: Vec<String>,
+    nonlinear_viscous_friction: Vec<String>,
     /// Difference of the Coulomb friction between the directions, N m or N
     #[arg(long, value_name = "[JOINT=]DIFFERENCE", allow_hyphen_values = true)]
-    asymmetry: Vec<String>,
+    friction_asymmetry: Vec<String>,
     /// Friction BETA |torque| sign(v)
     #[arg(long, value_name = "[JOINT=]BETA")]
-    load_friction: Vec<String>,
+    load_dependent_friction: Vec<String>,
     /// Factor on the measured torque: error of the torque constant
     #[arg(long, value_name = "[JOINT=]FACTOR")]
-    torque_gain: Vec<String>,
+    torque_constant: Vec<String>,
     /// Added to the measured position, rad or m
     #[arg(long, value_name = "[JOINT=]OFFSET", allow_hyphen_values = true)]
-    position_offset: Vec<String>,
+    joint_offset: Vec<String>,
     /// Delay of the measured torque, s
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
-    delay: f64,
+    torque_delay: f64,
     /// Rotation of the base about its x and y axes that the model does not know, rad
     #[arg(long, value_name = "RX,RY", allow_hyphen_values = true)]
-    tilt: Option<String>,
+    gravity_direction: Option<String>,
     /// Random deviation of all bodies and joint terms from the nominal model, up to this fraction
     #[arg(long, value_name = "FRACTION", default_value_t = 0.0)]
     perturb: f64,
@@ -253,21 +254,21 @@ fn settings(args: &Args, plant: &Plant) -> Result<Settings> {
     };
     let effects = &mut settings.effects;
     for (field, texts) in [
-        (Field::Stribeck, &args.stribeck),
-        (Field::Quadratic, &args.quadratic),
-        (Field::Asymmetry, &args.asymmetry),
-        (Field::LoadFriction, &args.load_friction),
-        (Field::TorqueGain, &args.torque_gain),
-        (Field::PositionOffset, &args.position_offset),
+        (Field::Stribeck, &args.stribeck_friction),
+        (Field::Quadratic, &args.nonlinear_viscous_friction),
+        (Field::Asymmetry, &args.friction_asymmetry),
+        (Field::LoadFriction, &args.load_dependent_friction),
+        (Field::TorqueGain, &args.torque_constant),
+        (Field::PositionOffset, &args.joint_offset),
     ] {
         for text in texts {
             effects.set(plant, field, text)?;
         }
     }
     effects.payload = args.payload.as_deref().map(parse_payload).transpose()?;
-    effects.torque_delay = args.delay;
+    effects.torque_delay = args.torque_delay;
     effects.perturb = args.perturb;
-    if let Some(text) = &args.tilt {
+    if let Some(text) = &args.gravity_direction {
         let v: Vec<f64> = text
             .split(',')
             .filter_map(|x| x.trim().parse().ok())
@@ -276,7 +277,7 @@ fn settings(args: &Args, plant: &Plant) -> Result<Settings> {
             [x, y] if x.abs() < 1.6 && y.abs() < 1.6 => [x, y],
             _ => {
                 return Err(Error::Argument(format!(
-                    "--tilt takes RX,RY in rad (below a right angle), not `{text}`"
+                    "--gravity-direction takes RX,RY in rad (below a right angle), not `{text}`"
                 )));
             }
         };

@@ -34,10 +34,10 @@ use crate::base::BaseParameters;
 use crate::dynamics::Tree;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::identifiability::{certificate, torque_noise};
-use crate::mechanism::{Mechanism, closed_certificate};
+use crate::mechanism::{Mechanism, PosePeak, closed_certificate};
 use crate::plant::Plant;
 use crate::robot::{JointTerm, Motion, Robot};
-use crate::trajectory::{Basis, Fourier, Space, Trajectory};
+use crate::trajectory::{Basis, Certificate, Fourier, Space, Trajectory};
 use closed_limits::ClosedLimits;
 use criterion::Objective;
 use information::Information;
@@ -160,23 +160,28 @@ pub fn design(
     let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
     let transform = transform(&base, settings);
     let info = Information::new(&robot, &basis, settings.period, count, transform, weights);
-    let torque = TorqueLimits::new(&robot, settings.derate);
     let mut derated = robot.clone();
     for joint in &mut derated.joints {
         joint.limits.effort *= settings.derate;
     }
     let tree = Tree::new(&robot);
-    Problem {
-        robot: &robot,
-        settings,
-        basis: &basis,
-        info: &info,
-        limits: Limits::new(&robot, &basis, settings.period, settings.derate),
-        path: torque.as_ref().map(|t| t as &dyn PathLimits),
-        space: None,
-        certified: &|fourier| Ok(certificate(&derated, &tree, fourier)?.satisfied),
-    }
-    .solve(begin, interrupt, progress)
+    first_certified(|tighter| {
+        let torque = TorqueLimits::new(&robot, settings.derate * tighter);
+        Problem {
+            robot: &robot,
+            settings,
+            basis: &basis,
+            info: &info,
+            limits: Limits::new(&robot, &basis, settings.period, settings.derate),
+            path: torque.as_ref().map(|t| t as &dyn PathLimits),
+            space: None,
+            broken: &|fourier| {
+                let c = certificate(&derated, &tree, fourier)?;
+                Ok(beyond(c.satisfied, [&c], &[]))
+            },
+        }
+        .solve(begin, interrupt, progress)
+    })
 }
 
 /// Designs an exciting trajectory of either kind of robot, see [`design`] and [`design_closed`].
@@ -226,19 +231,69 @@ pub fn design_closed(
         transform,
         weights,
     );
-    let path = ClosedLimits::new(mechanism, settings.derate, settings.period, count);
-    let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
-    Problem {
-        robot: &robot,
-        settings,
-        basis: &basis,
-        info: &info,
-        limits: limits.resting(&mechanism.home),
-        path: Some(&path),
-        space: Some(mechanism.space()),
-        certified: &|fourier| Ok(closed_certificate(mechanism, fourier, settings.derate)?.satisfied),
+    first_certified(|tighter| {
+        let derate = settings.derate * tighter;
+        let path = ClosedLimits::new(mechanism, derate, settings.period, count);
+        let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
+        Problem {
+            robot: &robot,
+            settings,
+            basis: &basis,
+            info: &info,
+            limits: limits.resting(&mechanism.home),
+            path: Some(&path),
+            space: Some(mechanism.space()),
+            broken: &|fourier| {
+                let c = closed_certificate(mechanism, fourier, settings.derate)?;
+                Ok(beyond(c.satisfied, [&c.platform, &c.actuators], &c.pose))
+            },
+        }
+        .solve(begin, interrupt, progress)
+    })
+}
+
+/// Shares of the limits along the path within which the search is repeated, one after the other,
+/// when the certificate refuses its result: samples miss peaks that lie between them.
+const TIGHTER: [f64; 4] = [1.0, 0.97, 0.9, 0.8];
+
+/// The first search whose result is certified. Every other result is dropped: the error says which
+/// limit the first one broke, and by how much.
+fn first_certified(
+    mut search: impl FnMut(f64) -> Result<Result<Design, String>>,
+) -> Result<Design> {
+    let mut refused = None;
+    for tighter in TIGHTER {
+        match (search(tighter), &refused) {
+            (Ok(Ok(design)), _) => return Ok(design),
+            (Ok(Err(why)), None) => refused = Some(why),
+            (Ok(Err(_)), Some(_)) => {}
+            (Err(e), None) => return Err(e),
+            (Err(_), Some(_)) => break,
+        }
     }
-    .solve(begin, interrupt, progress)
+    Err(Error::Infeasible(refused.unwrap_or_default()))
+}
+
+/// Steps by which a motion is shrunk until it is certified: to 82 % of its size at most.
+const SHRINKS: usize = 100;
+
+/// What a certificate finds broken, in words; `None` where all limits hold.
+fn beyond<'a>(
+    satisfied: bool,
+    certificates: impl IntoIterator<Item = &'a Certificate>,
+    pose: &[PosePeak],
+) -> Option<String> {
+    if satisfied {
+        return None;
+    }
+    let joints = certificates.into_iter().filter_map(|c| c.worst.as_ref());
+    let joints = joints.map(|w| (w.used, format!("{} of {}", w.kind.name(), w.joint)));
+    let pose = pose.iter().map(|p| (p.used, p.name.clone()));
+    let worst = joints.chain(pose).max_by(|a, b| a.0.total_cmp(&b.0));
+    Some(match worst {
+        Some((used, what)) => format!("{what} at {:.1} % of its limit", 100.0 * used),
+        None => "a limit that cannot be evaluated".into(),
+    })
 }
 
 fn something_to_identify(name: &str, base: &BaseParameters) -> Result<()> {
@@ -276,17 +331,18 @@ struct Problem<'a> {
     path: Option<&'a dyn PathLimits>,
     /// what the series move, of a closed chain
     space: Option<Space>,
-    /// whether a motion keeps all limits for all time
-    certified: &'a dyn Fn(&Fourier) -> Result<bool>,
+    /// the limit that a motion breaks at some time, in words
+    broken: &'a dyn Fn(&Fourier) -> Result<Option<String>>,
 }
 
 impl Problem<'_> {
+    /// The best trajectory that was found and certified, or what is broken in the best one.
     fn solve(
         &self,
         begin: Instant,
         interrupt: &AtomicBool,
         progress: &(dyn Fn(Progress) + Sync),
-    ) -> Result<Design> {
+    ) -> Result<Result<Design, String>> {
         let settings = self.settings;
         let (starts, time_limit) = settings.budget();
         let deadline = begin + Duration::from_secs_f64(time_limit.min(1e8));
@@ -339,7 +395,16 @@ impl Problem<'_> {
         let Some((best, iterate)) = search.best else {
             return Err(Error::Infeasible(self.infeasible()));
         };
-        let fourier = self.settle(iterate.x)?;
+        let fourier = match self.settle(&iterate.x)? {
+            Ok(fourier) => fourier,
+            Err(broken) => {
+                return Ok(Err(format!(
+                    "{}: no trajectory inside all limits was found: the best one has {broken}; raise that \
+                     limit, lower --derate, or choose a start posture or another --seed",
+                    self.robot.name
+                )));
+            }
+        };
         let trajectory = Trajectory {
             space: self.space,
             periods: settings.periods,
@@ -355,33 +420,43 @@ impl Problem<'_> {
             best,
             seconds: begin.elapsed().as_secs_f64(),
         };
-        Ok(Design {
+        Ok(Ok(Design {
             robot: self.robot.clone(),
             trajectory,
             value: iterate.value.exp(),
             record,
-        })
+        }))
     }
 
-    /// Rounds off: end conditions to the last digit, and the motion shrunk about its rest by
-    /// thousandths while the certificate, what happens between the samples included, finds
-    /// anything.
-    fn settle(&self, mut x: Vec<f64>) -> Result<Fourier> {
+    /// Rounds off: end conditions to the last digit, and the motion shrunk by thousandths while the
+    /// certificate, what happens between the samples included, finds anything: about its rest, then
+    /// (a rest that needs more torque than the motion makes it worse) about its own mean.
+    /// Otherwise what is broken in the motion as it came.
+    fn settle(&self, x: &[f64]) -> Result<Result<Fourier, String>> {
+        let first = self.basis.fourier(self.settings.period, x);
+        let Some(found) = (self.broken)(&first)? else {
+            return Ok(Ok(first));
+        };
         let m = self.basis.free();
-        for _ in 0..200 {
-            let fourier = self.basis.fourier(self.settings.period, &x);
-            if (self.certified)(&fourier)? {
-                return Ok(fourier);
-            }
-            for j in 0..self.robot.dof() {
-                let rest = self.limits.rest_parameters(j);
-                let x_j = &mut x[j * m..(j + 1) * m];
-                x_j.iter_mut()
-                    .zip(rest)
+        let rest = (0..self.robot.dof()).flat_map(|j| self.limits.rest_parameters(j));
+        let mean = (0..self.robot.dof()).flat_map(|j| {
+            let mut c = self.basis.coefficients(j, &x[j * m..(j + 1) * m]);
+            c.rows_range_mut(1..).fill(0.0);
+            self.basis.parameters(j, c.as_slice()).as_slice().to_vec()
+        });
+        for centre in [rest.collect::<Vec<f64>>(), mean.collect()] {
+            let mut x = x.to_vec();
+            for _ in 0..SHRINKS {
+                x.iter_mut()
+                    .zip(&centre)
                     .for_each(|(x, r)| *x = r + 0.998 * (*x - r));
+                let fourier = self.basis.fourier(self.settings.period, &x);
+                if (self.broken)(&fourier)?.is_none() {
+                    return Ok(Ok(fourier));
+                }
             }
         }
-        Ok(self.basis.fourier(self.settings.period, &x))
+        Ok(Err(found))
     }
 
     /// Why there is no feasible trajectory.
@@ -497,5 +572,34 @@ impl Search {
             report(self.next, b.value);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_refused_is_searched_again_and_then_an_error() {
+        let mut tried = Vec::new();
+        let found = first_certified(|tighter| {
+            tried.push(tighter);
+            Ok(Err(format!("torque of j2 at {} %", 106.5 * tighter)))
+        });
+        assert_eq!(tried, TIGHTER);
+        let message = found.unwrap_err().to_string();
+        assert_eq!(message, "torque of j2 at 106.5 %");
+        let mut count = 0;
+        let found = first_certified(|_| {
+            count += 1;
+            match count {
+                1 => Ok(Err("first".into())),
+                _ => Err(Error::Infeasible("nothing inside".into())),
+            }
+        });
+        assert_eq!(
+            (count, found.unwrap_err().to_string()),
+            (2, "first".to_string())
+        );
     }
 }

@@ -7,6 +7,8 @@
 //! | a stamp not after the one before (duplicate, out of order) | the row is left out |
 //! | many equal stamps (a coarse clock) | stamps are spread evenly |
 //! | jitter | resampling to an even grid |
+//! | a stamp far from both its neighbours | the row is left out |
+//! | a jump ahead by far more than the log is long | the later stamps are moved back, so that a gap of ten steps is left |
 //! | a gap | interpolated over so that filters run through, but marked as not measured |
 
 use crate::error::{Warning, WarningKind};
@@ -30,6 +32,17 @@ pub struct Clock {
 
 /// Steps longer than this many usual ones are gaps.
 const GAP: f64 = 2.5;
+/// Steps longer than this many usual ones, ahead or back, need an explanation.
+const JUMP: f64 = 20.0;
+/// Rows within which the time returns to its sequence after a wrong stamp.
+const WRONG: usize = 10;
+/// Samples that all gaps together may be filled with, in rows of the log: what is interpolated grows
+/// with the file, not with a number in it.
+const FILLED: f64 = 10.0;
+/// Steps that are left of a gap longer than that.
+const CLOSED: f64 = 10.0;
+/// Stamps larger than this are no times (a clock of nanoseconds is at 2e18).
+const LARGEST: f64 = 1e21;
 
 /// Median of numbers (of a copy, by selection).
 pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
@@ -65,9 +78,9 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
     let mut out = Clock::default();
     let mut warn = |kind, message: String| out.warnings.push(Warning::new(kind, subject, message));
     let steps = || raw.windows(2).map(|w| w[1] - w[0]);
+    let time = |x: f64| x.is_finite() && x.abs() < LARGEST;
     let usual = median(steps().filter(|d| *d > 0.0));
     if !usual.is_finite() {
-        out.t = raw.to_vec();
         return out;
     }
     let same = steps().filter(|d| *d == 0.0).count();
@@ -77,15 +90,49 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
     let mut t: Vec<f64> = Vec::with_capacity(raw.len());
     let (mut shift, mut lost, mut twice, mut back, mut wraps) = (0.0, 0, 0, 0, 0);
     let mut wrap_text = String::new();
+    let mut first_lost = usize::MAX;
+    let (mut wrong, mut ahead) = (Vec::new(), Vec::new());
+    let mut room = FILLED * raw.len() as f64;
+    // whether a stamp after row i goes on where those before it were, at `last`
+    let returns = |i: usize, last: f64, now: f64, shift: f64| {
+        let later = raw[i + 1..].iter().take(WRONG).filter(|x| time(**x));
+        later.zip(2..).any(|(x, k)| {
+            let x = x + shift;
+            x > last && x - last < JUMP * f64::from(k) * usual && (x < now || now < last)
+        })
+    };
     for (i, &x) in raw.iter().enumerate() {
-        if !x.is_finite() {
+        if !time(x) {
+            first_lost = first_lost.min(i);
             lost += 1;
             continue;
         }
         let mut now = x + shift;
+        if t.is_empty()
+            && let Some(next) = raw[i + 1..].iter().find(|y| time(**y))
+            && (next - x < -JUMP * usual || next - x > room * usual)
+        {
+            wrong.push((i, x));
+            continue;
+        }
         if let Some(&last) = t.last() {
             let step = now - last;
-            if step < -20.0 * usual {
+            let far = step < -JUMP * usual || step > room.max(JUMP) * usual;
+            let at_the_end = far && i + 1 == raw.len();
+            if step.abs() > JUMP * usual && (at_the_end || returns(i, last, now, shift)) {
+                wrong.push((i, x));
+                continue;
+            }
+            if step > JUMP * usual {
+                if far {
+                    ahead.push((i, step));
+                    shift -= step - CLOSED * usual;
+                    now = last + CLOSED * usual;
+                } else {
+                    room -= step / usual;
+                }
+            }
+            if step < -JUMP * usual {
                 // the clock began anew: the next sample follows by one usual step
                 let jump = -step + usual;
                 if wraps == 0 {
@@ -112,7 +159,35 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
     if lost > 0 {
         warn(
             WarningKind::RowsLeftOut,
-            format!("{lost} rows have no time stamp and were left out"),
+            format!(
+                "{lost} rows have no time stamp and were left out, the first is row {}",
+                first_lost + 1
+            ),
+        );
+    }
+    if let Some((row, x)) = wrong.first() {
+        warn(
+            WarningKind::RowsLeftOut,
+            format!(
+                "{} time stamps are far from those around them and their rows were left out, the first at row {} \
+                 ({x:e} s)",
+                wrong.len(),
+                row + 1
+            ),
+        );
+    }
+    if let Some((row, by)) = ahead.first() {
+        let more = match ahead.len() {
+            1 => String::new(),
+            n => format!(" (and {} times more)", n - 1),
+        };
+        warn(
+            WarningKind::TimeRepaired,
+            format!(
+                "the time jumps ahead by {by:.6} s at row {}{more}, by far more than the log is long: the clock \
+                 was set, or the recording stopped; the stamps after it were moved back to follow by {CLOSED} steps",
+                row + 1
+            ),
         );
     }
     if wraps > 0 {

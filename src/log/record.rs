@@ -15,6 +15,8 @@ const GROUPS: [&str; 8] = ["tau", "ddq", "dq", "qref", "ql", "q", "pa", "pb"];
 
 /// Shortest period of a motion, in samples.
 const SHORTEST: f64 = 4.0;
+/// Most samples of the even grid, in rows of the log.
+const MOST: usize = 30;
 
 /// Group and number of a column name: `tau3` is `("tau", 3)`.
 fn numbered(name: &str) -> Option<(&'static str, usize)> {
@@ -24,6 +26,16 @@ fn numbered(name: &str) -> Option<(&'static str, usize)> {
     (!digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
         .then(|| digits.parse().ok().map(|k| (group, k)))
         .flatten()
+}
+
+/// The names in the header for a message: the first of them, and nothing that a terminal obeys.
+fn header(names: &[String]) -> String {
+    const SHOWN: usize = 200;
+    let all: String = names.join(",").escape_debug().collect();
+    match all.chars().count() > SHOWN {
+        true => format!("{}…", all.chars().take(SHOWN).collect::<String>()),
+        false => all,
+    }
 }
 
 /// Takes the columns of a group out of the table, one an actuator.
@@ -74,20 +86,24 @@ fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warn
             None => unknown.push(name.as_str()),
         }
     }
-    if table.find("t").is_none() {
-        let message = match table.find("time") {
+    let missing = if table.find("t").is_none() {
+        match table.find("time") {
             Some(_) => "there is no column t; it has one called time: rename it",
             None => "there is no column t (time, s)",
-        };
-        return error(message.into());
-    }
-    if table.find("q1").is_none() {
-        return error("there are no columns q1… (positions of the actuated joints)".into());
-    }
-    if table.find("tau1").is_none() && table.find("pa1").is_none() {
-        return error(
-            "there are no columns tau1… (torques or forces of the actuated joints)".into(),
-        );
+        }
+    } else if table.find("q1").is_none() {
+        "there are no columns q1… (positions of the actuated joints)"
+    } else if table.find("tau1").is_none() && table.find("pa1").is_none() {
+        "there are no columns tau1… (torques or forces of the actuated joints)"
+    } else {
+        ""
+    };
+    if !missing.is_empty() {
+        return error(format!(
+            "{missing}; the header is `{}`, expected are t, q1 to q{n}, tau1 to tau{n}, and if recorded dq1…, \
+             ddq1…, qref1…",
+            header(&table.names)
+        ));
     }
     Ok(match unknown.is_empty() {
         true => Vec::new(),
@@ -117,18 +133,26 @@ impl Record {
     ) -> Result<Record> {
         let path = path.as_ref();
         let known = |name: &str| name == "t" || POSE.contains(&name) || numbered(name).is_some();
-        let mut table = Table::read(path, &known)?;
         let joints = plant.actuators();
         let n = joints.len();
+        let check = |table: &Table| check_names(table, &joints, path);
+        let (mut table, unknown) = Table::read_checked(path, &known, &check)?;
         let mut warnings = std::mem::take(&mut table.warnings);
-        warnings.extend(check_names(&table, &joints, path)?);
+        warnings.extend(unknown);
         let subject = path.display().to_string();
 
         let at = table.find("t").unwrap_or(0);
         let clock = clock::repair(&table.columns[at], &subject);
         warnings.extend(clock.warnings.iter().cloned());
         if clock.t.len() < 8 {
-            let message = format!("{} samples are too few", clock.t.len());
+            let message = match table.rows() >= 8 {
+                true => format!(
+                    "of {} rows, only {} have a time stamp later than the one before: column t must increase",
+                    table.rows(),
+                    clock.t.len()
+                ),
+                false => format!("{} samples are too few", clock.t.len()),
+            };
             return Err(Error::file(path, "", message));
         }
         if let Some(keep) = &clock.keep {
@@ -175,7 +199,7 @@ impl Record {
         record.fill_dropped(&clock)?;
         record.check_channels(&joints)?;
         record.drop_short_period(clock.step);
-        record.resample(&clock);
+        record.resample(&clock)?;
         record.check_period();
         Ok(record)
     }
@@ -333,7 +357,7 @@ impl Record {
     }
 
     /// Puts all channels on an even grid; with a period, on one that divides it.
-    fn resample(&mut self, clock: &Clock) {
+    fn resample(&mut self, clock: &Clock) -> Result<()> {
         let (first, last) = (clock.t[0], clock.t[clock.t.len() - 1]);
         let mut step = clock.step;
         if let Some(period) = self.period {
@@ -341,13 +365,22 @@ impl Record {
         }
         // time stamps that jitter may miss the last point of the grid by some of a step
         let count = ((last - first) / step + 0.1).floor() as usize + 1;
+        if count > MOST * clock.t.len() {
+            let message = format!(
+                "its {} rows last {:.3e} s, but their usual step is {step:.3e} s: column t is not an even clock; \
+                 check its unit and its numbers",
+                clock.t.len(),
+                last - first
+            );
+            return Err(Error::file(&self.path, "column t", message));
+        }
         let drift = (step - clock.step).abs() * count as f64;
         self.step = step;
         if clock.even && drift <= 0.02 * step && count >= clock.t.len() {
             self.t = (0..clock.t.len())
                 .map(|i| first + step * i as f64)
                 .collect();
-            return;
+            return Ok(());
         }
         let grid: Vec<f64> = (0..count).map(|i| first + step * i as f64).collect();
         let mut list = self.channels();
@@ -370,6 +403,7 @@ impl Record {
         self.valid = valid;
         self.t = grid;
         self.resampled = true;
+        Ok(())
     }
 
     /// Whether the motion repeats with the period that was stated.

@@ -51,7 +51,20 @@ impl Table {
     /// A file that cannot be read, without header or without lines; a line with another number of
     /// cells than the header, or with a cell that is no number, by its number.
     pub fn read(path: impl AsRef<Path>, wanted: &dyn Fn(&str) -> bool) -> Result<Self> {
-        let path = path.as_ref();
+        Ok(Self::read_checked(path.as_ref(), wanted, &|_| Ok(()))?.0)
+    }
+
+    /// As [`Table::read`]; `check` looks at the names before any line is read, and what it returns is
+    /// handed on.
+    ///
+    /// # Errors
+    /// Those of [`Table::read`] and of `check`.
+    pub fn read_checked<T>(
+        path: &Path,
+        wanted: &dyn Fn(&str) -> bool,
+        check: &dyn Fn(&Table) -> Result<T>,
+    ) -> Result<(Self, T)> {
+        let mut checked = None;
         let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
         let size = file.metadata().map_or(0, |m| m.len());
         let mut block = vec![0u8; BLOCK.min(size as usize + 1).max(64 << 10)];
@@ -94,6 +107,7 @@ impl Table {
                     column.reserve(if *keep { rows / 2 } else { 0 });
                 }
                 table.names = names;
+                checked = Some(check(&table)?);
                 line = lines;
                 text = rest;
             }
@@ -105,12 +119,13 @@ impl Table {
                 break;
             }
         }
-        let rows = table.columns.iter().map(Vec::len).max().unwrap_or(0);
-        if rows == 0 {
-            let message = "it has a header and no samples under it; was the recording stopped?";
-            return Err(Error::file(path, "", message));
+        match checked {
+            Some(checked) if table.rows() > 0 => Ok((table, checked)),
+            _ => {
+                let message = "it has a header and no samples under it; was the recording stopped?";
+                Err(Error::file(path, "", message))
+            }
         }
-        Ok(table)
     }
 
     /// Number of rows.

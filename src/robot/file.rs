@@ -6,7 +6,7 @@ mod template;
 
 use super::urdf::{Options, Urdf};
 use super::{Prior, Robot, bundled};
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result};
 use crate::mechanism;
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -392,16 +392,10 @@ fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
     for entry in file.joint.iter().map(Spanned::get_ref) {
         let name = entry.name.get_ref();
         let what = format!("joint `{name}`");
-        match robot.joints.iter_mut().find(|j| j.name == *name) {
-            Some(joint) => {
-                let warnings = &mut robot.warnings;
-                joint_values(source, entry, &what, joint, warnings)?;
-            }
-            None => robot.warnings.push(Warning::new(
-                WarningKind::EntryIgnored,
-                what,
-                "it is locked; its [[joint]] entry has no effect",
-            )),
+        // the entry of a locked joint waits until it is free again
+        if let Some(joint) = robot.joints.iter_mut().find(|j| j.name == *name) {
+            let warnings = &mut robot.warnings;
+            joint_values(source, entry, &what, joint, warnings)?;
         }
     }
     robot.hash = format!(

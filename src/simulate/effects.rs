@@ -77,12 +77,12 @@ pub enum Field {
 impl Field {
     fn option(self) -> &'static str {
         match self {
-            Field::Stribeck => "--stribeck",
-            Field::Quadratic => "--quadratic",
-            Field::Asymmetry => "--asymmetry",
-            Field::LoadFriction => "--load-friction",
-            Field::TorqueGain => "--torque-gain",
-            Field::PositionOffset => "--position-offset",
+            Field::Stribeck => "--stribeck-friction",
+            Field::Quadratic => "--nonlinear-viscous-friction",
+            Field::Asymmetry => "--friction-asymmetry",
+            Field::LoadFriction => "--load-dependent-friction",
+            Field::TorqueGain => "--torque-constant",
+            Field::PositionOffset => "--joint-offset",
         }
     }
 }

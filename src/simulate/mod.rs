@@ -114,7 +114,7 @@ impl Settings {
         }
         if !(self.effects.torque_delay >= 0.0 && self.effects.torque_delay < 1.0) {
             return Err(Error::Argument(format!(
-                "--delay must be from 0 to below 1 s, not {}",
+                "--torque-delay must be from 0 to below 1 s, not {}",
                 self.effects.torque_delay
             )));
         }

@@ -362,3 +362,60 @@ fn impossible_problems_are_refused_with_the_reason() {
         other => panic!("{:?}", other.map(|d| d.value)),
     }
 }
+
+/// In the middle of the range of joint 1 the arm lies flat and needs more torque than there is; a
+/// motion that is shrunk towards it gets worse. What is returned keeps the limit, or nothing is.
+#[test]
+fn what_is_not_certified_is_not_a_result() {
+    let urdf = excite::robot::bundled::find("planar2").unwrap().urdf;
+    let toml = r#"
+        name = "tight"
+        urdf = "planar2.urdf"
+        [[joint]]
+        name = "joint1"
+        velocity = 8.0
+        acceleration = 400.0
+        jerk = 40000.0
+        effort = 31.0
+        [[joint]]
+        name = "joint2"
+        position = [-3.1, 3.1]
+        velocity = 8.0
+        acceleration = 400.0
+        jerk = 40000.0
+        effort = 20.0"#;
+    let robot = Robot::from_toml_str(toml, urdf, "tight.toml").unwrap();
+    let mut designed = 0;
+    for (criterion, seed) in [
+        (Criterion::D, 1),
+        (Criterion::D, 2),
+        (Criterion::Condition, 1),
+    ] {
+        let settings = Settings {
+            harmonics: 2,
+            period: 4.0,
+            ends: Ends::Free,
+            criterion,
+            seed,
+            ..small(2)
+        };
+        match run(&robot, &settings) {
+            Ok(d) => {
+                let tree = excite::dynamics::Tree::new(&d.robot);
+                let c =
+                    excite::identifiability::certificate(&d.robot, &tree, &d.trajectory.fourier)
+                        .unwrap();
+                assert!(c.satisfied, "{criterion:?} {seed}: {:?}", c.worst);
+                designed += 1;
+            }
+            Err(e) => {
+                let message = e.to_string();
+                assert!(
+                    message.contains("torque of joint1 at 1") && message.contains('%'),
+                    "{message}"
+                );
+            }
+        }
+    }
+    assert!(designed > 0, "no design at all was found");
+}

@@ -524,3 +524,158 @@ fn every_kind_of_warning_is_documented() {
     let codes: Vec<&str> = excite::WarningKind::ALL.iter().map(|k| k.code()).collect();
     assert_eq!(written, codes);
 }
+
+/// Long help, with an example, for every command.
+#[test]
+fn every_command_explains_itself() {
+    let t = Test::new();
+    let list = t.run("--help").stdout;
+    let commands = list.split("Commands:").nth(1).unwrap();
+    let commands = commands.split("Options:").next().unwrap();
+    let mut seen = Vec::new();
+    for line in commands
+        .lines()
+        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
+    {
+        let mut words = line.split_whitespace();
+        let name = words.next().unwrap();
+        assert!(
+            words.next().is_some(),
+            "nothing is said of {name} in\n{list}"
+        );
+        if name == "help" {
+            continue;
+        }
+        let help = t.run(&format!("{name} --help"));
+        assert_eq!((help.status, help.stderr.as_str()), (0, ""), "{name}");
+        assert!(
+            help.stdout.contains(&format!("  excite {name}")) && help.stdout.contains("Example"),
+            "no example for {name}:\n{}",
+            help.stdout
+        );
+        // what only the long help says stands before the usage
+        let about = |text: &str| text.split("Usage:").next().unwrap().trim().to_string();
+        let (long, short) = (
+            about(&help.stdout),
+            about(&t.run(&format!("{name} -h")).stdout),
+        );
+        if name != "robots" {
+            assert!(
+                long.len() > short.len() + 40,
+                "{name}: the long help is\n{long}"
+            );
+        }
+        assert!(!short.contains('\n'), "{name}: {short}");
+        seen.push(name.to_string());
+    }
+    assert!(seen.len() >= 9, "{seen:?}");
+}
+
+/// The template can be used where it was written, as it is and with its lock.
+#[test]
+fn a_new_robot_file_works_where_it_was_written() {
+    let t = Test::new();
+    std::fs::create_dir_all(t.path().join("description/arms")).unwrap();
+    std::fs::create_dir_all(t.path().join("else/where")).unwrap();
+    std::fs::write(t.path().join("description/arms/two.urdf"), planar()).unwrap();
+    let out = t.run("new description/arms/two.urdf --output robots/two.toml");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    t.fails(
+        "new description/arms/two.urdf --output robots/two.toml",
+        1,
+        &["--force"],
+    );
+    // as a shell does with `>`
+    let file = std::fs::File::create(t.path().join("else/where/two.toml")).unwrap();
+    let done = std::process::Command::new(assert_cmd::cargo::cargo_bin("excite"))
+        .current_dir(t.path())
+        .args(["new", "description/arms/two.urdf"])
+        .stdout(file)
+        .status()
+        .unwrap();
+    assert!(done.success());
+    for (k, robot) in ["robots/two.toml", "else/where/two.toml"]
+        .into_iter()
+        .enumerate()
+    {
+        let text = std::fs::read_to_string(t.path().join(robot)).unwrap();
+        if k == 0 || cfg!(target_os = "linux") {
+            assert!(text.contains("/description/arms/two.urdf\""), "{text}");
+            let out = t.run(&format!("identifiability {robot} --output free{k}"));
+            assert_eq!(out.status, 0, "{}", out.stderr);
+        }
+    }
+    // its lock line, as it stands there
+    let text = std::fs::read_to_string(t.path().join("robots/two.toml")).unwrap();
+    let locked = text.replacen("# lock = ", "lock = ", 1);
+    assert_ne!(text, locked);
+    std::fs::write(t.path().join("robots/locked.toml"), locked).unwrap();
+    let out = t.run("identifiability robots/locked.toml --output locked");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(!out.stderr.contains("lock"), "{}", out.stderr);
+    assert_eq!(
+        t.json("locked/report.json")["joints"],
+        serde_json::json!(["joint1"])
+    );
+    // out of the range of the pipes: the working directory
+    let out = t.run("new description/arms/two.urdf");
+    assert!(
+        out.stdout.contains("\"description/arms/two.urdf\""),
+        "{}",
+        out.stdout
+    );
+}
+
+/// A header of other names is shown, with what is expected.
+#[test]
+fn a_log_with_other_names_is_named() {
+    let t = Test::new()
+        .file(
+            "e.toml",
+            "robot = \"planar2\"\n[[record]]\nlog = \"a.csv\"\nuse = \"fit\"\n",
+        )
+        .file(
+            "a.csv",
+            "time,position_1,position_2,torque_1,torque_2\n0,0,0,0,0\n0.01,0,0,0,0\n",
+        );
+    let words = [
+        "a.csv",
+        "line 1",
+        "time,position_1",
+        "t, q1 to q2, tau1 to tau2",
+        "rename",
+    ];
+    for command in ["identify", "diagnose", "load"] {
+        t.fails(&format!("{command} e.toml --output o"), 1, &words);
+    }
+}
+
+/// The options of `simulate` are called as the diagnosis calls the effects.
+#[test]
+fn simulated_effects_have_the_names_of_the_catalogue() {
+    let t = Test::new();
+    let help = t.run("simulate --help").stdout;
+    for effect in [
+        "payload",
+        "stribeck_friction",
+        "nonlinear_viscous_friction",
+        "friction_asymmetry",
+        "load_dependent_friction",
+        "torque_constant",
+        "joint_offset",
+        "torque_delay",
+        "gravity_direction",
+    ] {
+        let option = format!("--{}", effect.replace('_', "-"));
+        assert!(help.contains(&option), "{option} is not in\n{help}");
+    }
+    for gone in [
+        "quadratic",
+        "load-friction",
+        "torque-gain",
+        "position-offset",
+        "tilt",
+    ] {
+        t.fails(&format!("simulate planar2 t.json --{gone} 1"), 2, &[gone]);
+    }
+}

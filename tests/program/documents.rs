@@ -172,7 +172,7 @@ fn keys_of_a_serial_robots_files_are_documented() {
             at,
             &format!(
                 "simulate planar2 d/{motion}.json --rate 200 --step 0.001 --perturb 0.1 --seed 1 \
-                 --quadratic joint1=1 --output log/{motion}.csv --experiment log/experiment.toml --use {purpose}"
+                 --nonlinear-viscous-friction joint1=1 --output log/{motion}.csv --experiment log/experiment.toml --use {purpose}"
             ),
         );
     }

@@ -122,6 +122,59 @@ fn time_stamps_are_repaired_and_said() {
     says(&r, &["milliseconds"]);
 }
 
+/// A number in a file must not decide how much is stored, and one bad row must not lose the others.
+#[test]
+fn wrong_time_stamps_are_named_and_left_out() {
+    let dir = folder();
+    for stamp in ["1e9", "-1e9", "1e5", "-250", "1e300", "NaN", "inf"] {
+        for row in [0, 1, 700, 998, 999] {
+            let r = read(&log("stamp.csv", &dir, 1000, |i, c| {
+                if i == row {
+                    c[0] = stamp.into();
+                }
+            }))
+            .unwrap();
+            says(&r, &[&format!("row {}", row + 1), "left out"]);
+            let kept = if row == 0 || row == 999 { 999 } else { 1000 };
+            assert_eq!(r.len(), kept, "{stamp} in row {row}");
+            let last = r.t[r.len() - 1];
+            assert!((0.0..2.0).contains(&last), "{stamp} in row {row}: {last}");
+            let lost = r.valid.iter().filter(|v| !**v).count();
+            assert!(lost <= 2, "{stamp} in row {row}: {lost}");
+        }
+    }
+    // several in a row
+    let r = read(&log("some.csv", &dir, 1000, |i, c| {
+        if (300..305).contains(&i) {
+            c[0] = format!("{}", 1e9 + i as f64);
+        }
+    }))
+    .unwrap();
+    says(&r, &["5 time stamps", "row 301"]);
+    assert_eq!(r.len(), 1000);
+    // a clock that is set in the middle
+    let r = read(&log("set.csv", &dir, 1000, |i, c| {
+        if i >= 500 {
+            c[0] = format!("{}", 1.7e9 + 0.002 * i as f64);
+        }
+    }))
+    .unwrap();
+    says(&r, &["jumps ahead", "row 501", "1 gaps"]);
+    assert!((1000..1020).contains(&r.len()), "{}", r.len());
+    // jumps everywhere
+    for size in [1e9, 1e200] {
+        let jumps = log("jumps.csv", &dir, 1000, |i, c| {
+            c[0] = format!("{:e}", 0.002 * i as f64 + size * (i / 4) as f64);
+        });
+        if let Ok(r) = read(&jumps) {
+            assert!(r.len() < 100_000, "{}", r.len());
+        }
+    }
+    let still = log("still.csv", &dir, 1000, |_, c| c[0] = "3".into());
+    let message = read(&still).unwrap_err().to_string();
+    assert!(message.contains("must increase"), "{message}");
+}
+
 #[test]
 fn a_period_of_less_than_four_samples_is_none() {
     let dir = folder();

@@ -439,14 +439,14 @@ fn the_command_writes_a_log_and_an_experiment_and_refuses_nonsense() {
     let (code, _, err) = with(&[]);
     assert!(code == 1 && err.contains("--force"), "{err}");
     for (more, wanted) in [
-        (&["--stribeck", "no=1,0.1"][..], "no actuator `no`"),
-        (&["--stribeck", "1"], "EXTRA,VELOCITY"),
+        (&["--stribeck-friction", "no=1,0.1"][..], "no actuator `no`"),
+        (&["--stribeck-friction", "1"], "EXTRA,VELOCITY"),
         (&["--payload", "-1,0,0,0"], "mass > 0"),
         (&["--payload", "1,2"], "numbers"),
         (&["--rate", "0"], "positive"),
         (&["--perturb", "2"], "fraction"),
         (&["--pose"], "no platform"),
-        (&["--tilt", "1"], "RX,RY"),
+        (&["--gravity-direction", "1"], "RX,RY"),
         (&["--monte-carlo", "1"], "at least 2"),
     ] {
         let other = at("other.csv");

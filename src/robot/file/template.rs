@@ -21,7 +21,8 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
          urdf = {}                 # relative to this file\n\
          gravity = [{:?}, {:?}, {:?}]     # acceleration of gravity in base axes, m/s^2\n\
          prior = \"{prior}\"                # trust in the URDF's inertia: \"cad\" (rough) or \"identified\" (close)\n\
-         # lock = {{ {} = 0.0 }}      # joints held fixed at a position, their links merged into the parent\n\n\
+         # lock = {{ {} = 0.0 }}      # joints held fixed at a position, their links merged into the parent\n\
+         #                            (the [[joint]] of a locked joint may stay: it has no effect until the lock is gone)\n\n\
          # Joints, in the order of the columns of every log. Every key but `name` is optional;\n\
          # one that is commented out has no value yet, and no limit where it is a limit.\n",
         quoted(&robot.name),
