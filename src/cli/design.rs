@@ -137,9 +137,9 @@ pub fn run(args: Args) -> Result<()> {
     };
     settings.check(&plant.moved())?;
     let length = args.rate * settings.period * f64::from(settings.periods);
-    if !(args.rate > 0.0 && args.rate.is_finite() && length <= 1e8) {
+    if !(args.rate > 0.0 && args.rate.is_finite() && length <= 1e7) {
         return Err(Error::Argument(format!(
-            "--rate must be more than 0 and give at most 1e8 samples, not {}",
+            "--rate must be more than 0 and give at most 1e7 samples, not {}",
             args.rate
         )));
     }

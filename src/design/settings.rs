@@ -86,9 +86,9 @@ impl Settings {
                 self.harmonics
             ));
         }
-        if !(self.period.is_finite() && self.period > 0.0 && self.period <= 1e5) {
+        if !((1e-3..=1e5).contains(&self.period)) {
             return bad(format!(
-                "period must be more than 0 and at most 1e5 s, not {}",
+                "period must be between 1e-3 and 1e5 s, not {}",
                 self.period
             ));
         }

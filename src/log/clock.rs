@@ -109,8 +109,13 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
         }
         let mut now = x + shift;
         if t.is_empty()
-            && let Some(next) = raw[i + 1..].iter().find(|y| time(**y))
+            && let [next, after] = raw[i + 1..]
+                .iter()
+                .filter(|y| time(**y))
+                .take(2)
+                .collect::<Vec<_>>()[..]
             && (next - x < -JUMP * usual || next - x > room * usual)
+            && (after - next).abs() <= JUMP * usual
         {
             wrong.push((i, x));
             continue;

@@ -38,8 +38,8 @@ fn header(names: &[String]) -> String {
     }
 }
 
-/// Takes the columns of a group out of the table, one an actuator.
-fn take(table: &mut Table, group: &str, n: usize, path: &Path) -> Result<Option<Vec<Vec<f64>>>> {
+/// Where the columns of a group stand, one an actuator; `None` where there is none of them.
+fn columns_of(table: &Table, group: &str, n: usize, path: &Path) -> Result<Option<Vec<usize>>> {
     let at: Vec<Option<usize>> = (1..=n)
         .map(|k| table.find(&format!("{group}{k}")))
         .collect();
@@ -53,12 +53,17 @@ fn take(table: &mut Table, group: &str, n: usize, path: &Path) -> Result<Option<
         );
         return Err(Error::file(path, "line 1", message));
     }
-    let columns = at.into_iter().flatten();
-    Ok(Some(
-        columns
+    Ok(Some(at.into_iter().flatten().collect()))
+}
+
+/// Takes the columns of a group out of the table, one an actuator.
+fn take(table: &mut Table, group: &str, n: usize, path: &Path) -> Result<Option<Vec<Vec<f64>>>> {
+    let at = columns_of(table, group, n, path)?;
+    Ok(at.map(|at| {
+        at.into_iter()
             .map(|c| std::mem::take(&mut table.columns[c]))
-            .collect(),
-    ))
+            .collect()
+    }))
 }
 
 /// Whether the names of the columns can be those of a log of `n` actuators.
@@ -104,6 +109,9 @@ fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warn
              ddq1…, qref1…",
             header(&table.names)
         ));
+    }
+    for group in GROUPS {
+        columns_of(table, group, n, path)?;
     }
     Ok(match unknown.is_empty() {
         true => Vec::new(),
@@ -360,7 +368,8 @@ impl Record {
     fn resample(&mut self, clock: &Clock) -> Result<()> {
         let (first, last) = (clock.t[0], clock.t[clock.t.len() - 1]);
         let mut step = clock.step;
-        if let Some(period) = self.period {
+        // a period that the record does not nearly hold is judged later; it cannot shape the grid
+        if let Some(period) = self.period.filter(|p| *p < 1e3 * (last - first)) {
             step = period / (period / step).round();
         }
         // time stamps that jitter may miss the last point of the grid by some of a step

@@ -46,6 +46,13 @@ use friction::{Friction, Mode, hold};
 use nalgebra::{DMatrix, DVector};
 use std::collections::VecDeque;
 
+/// Most numbers of a simulated log in memory (1.6 GB).
+const NUMBERS: f64 = 2e8;
+/// Most steps of the integrator.
+const STEPS: f64 = 1e9;
+/// Most steps of one period, for which the controller keeps a table.
+const TABLE: f64 = 2e6;
+
 /// Times that friction may change its mode within one step before the step is taken as it is.
 const EVENTS: usize = 60;
 
@@ -397,6 +404,24 @@ pub fn simulate(
             plant.coordinate_names().join(", ")
         )));
     }
+    let samples = (fourier.period * f64::from(periods) * settings.rate).round();
+    let (m, na) = (plant.coordinates(), plant.actuated().len());
+    let most = (NUMBERS / (1 + 3 * m + 6 * na) as f64).floor();
+    if !(1.0..=most).contains(&samples) {
+        return Err(Error::Argument(format!(
+            "{periods} periods of {} s at {} Hz are {samples} samples; from 1 to {most} can be simulated: choose \
+             another --rate or fewer --periods",
+            fourier.period, settings.rate
+        )));
+    }
+    let duration = fourier.period * (f64::from(periods) + f64::from(settings.lead_in));
+    if duration / settings.step > STEPS || fourier.period / settings.step > TABLE {
+        return Err(Error::Argument(format!(
+            "{} periods before the log and {periods} in it, {duration} s, are too many steps of {} s: \
+             {STEPS:e} in all and {TABLE:e} a period are possible; choose a larger --step or fewer periods",
+            settings.lead_in, settings.step
+        )));
+    }
     let effects = &settings.effects;
     let terms = effects.terms(plant, settings.seed);
     let actuated = plant.actuated();
@@ -438,7 +463,6 @@ pub fn simulate(
         unsettled: 0,
     };
 
-    let (m, na) = (plant.coordinates(), actuated.len());
     let mut x = DVector::zeros(m);
     let mut xd = DVector::zeros(m);
     fourier.evaluate(0.0, [x.as_mut_slice(), xd.as_mut_slice()]);
@@ -450,13 +474,6 @@ pub fn simulate(
                 v => Mode::Slides(v > 0.0),
             };
         }
-    }
-    let samples = (fourier.period * f64::from(periods) * settings.rate).round();
-    if !(1.0..=1e8).contains(&samples) {
-        return Err(Error::Argument(format!(
-            "{periods} periods at {} Hz are {samples} samples; from 1 to 1e8 can be simulated",
-            settings.rate
-        )));
     }
     let count = samples as usize;
     // the log starts after whole periods; its grid is the log's

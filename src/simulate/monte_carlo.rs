@@ -203,6 +203,9 @@ impl Setup<'_> {
     }
 }
 
+/// Most rehearsals.
+const MOST: usize = 100_000;
+
 /// Measures and identifies `rehearsals` times.
 ///
 /// # Errors
@@ -219,10 +222,10 @@ pub fn monte_carlo(
     let count = run.t.len();
     let n = (fourier.period * settings.rate).round() as usize;
     let whole = (fourier.period * settings.rate - n as f64).abs() < 1e-6 * n as f64;
-    if rehearsals < 2 {
-        return Err(Error::Argument(
-            "--monte-carlo needs at least 2 rehearsals".into(),
-        ));
+    if !(2..=MOST).contains(&rehearsals) {
+        return Err(Error::Argument(format!(
+            "--monte-carlo takes from 2 to {MOST} rehearsals, not {rehearsals}"
+        )));
     }
     if !whole || n == 0 || !count.is_multiple_of(n) {
         return Err(Error::Argument(format!(

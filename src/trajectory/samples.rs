@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// Most rows written into one file.
-const ROWS_MAX: f64 = 1e8;
+const ROWS_MAX: f64 = 1e7;
 
 /// A sampled motion, column by column.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -109,7 +109,7 @@ impl Samples {
 /// step may be shorter than the others.
 ///
 /// # Errors
-/// [`Error::Argument`] if rate or duration are not positive numbers or ask for more than 10⁸ rows.
+/// [`Error::Argument`] if rate or duration are not positive numbers or ask for more than 10⁷ rows.
 pub fn times(duration: f64, rate: f64) -> Result<Vec<f64>> {
     if !(rate.is_finite() && rate > 0.0) {
         return Err(Error::Argument(format!(

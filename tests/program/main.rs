@@ -6,5 +6,6 @@ mod common;
 mod cli;
 mod dependencies;
 mod documents;
+mod mutations;
 mod rehearsal;
 mod report;

@@ -187,6 +187,17 @@ fn a_period_of_less_than_four_samples_is_none() {
 }
 
 #[test]
+fn a_period_longer_than_any_record_is_none() {
+    let dir = folder();
+    let path = log("clean.csv", &dir, 1000, |_, _| {});
+    for period in [1e6, 1e300, 1e308] {
+        let r = read_periodic(&path, Some(period)).unwrap();
+        says(&r, &["less than two periods"]);
+        assert_eq!((r.len(), r.valid.len()), (1000, 1000), "{period}");
+    }
+}
+
+#[test]
 fn channels_that_cannot_be_are_named() {
     let dir = folder();
     let r = read(&log("holes.csv", &dir, 2000, |i, c| {

@@ -447,6 +447,9 @@ fn the_command_writes_a_log_and_an_experiment_and_refuses_nonsense() {
         (&["--perturb", "2"], "fraction"),
         (&["--pose"], "no platform"),
         (&["--gravity-direction", "1"], "RX,RY"),
+        (&["--lead-in", "4000000000"], "too many steps"),
+        (&["--step", "1e-300"], "too many steps"),
+        (&["--rate", "1e9"], "can be simulated"),
         (&["--monte-carlo", "1"], "at least 2"),
     ] {
         let other = at("other.csv");
