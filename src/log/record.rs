@@ -15,6 +15,8 @@ const GROUPS: [&str; 8] = ["tau", "ddq", "dq", "qref", "ql", "q", "pa", "pb"];
 
 /// Shortest period of a motion, in samples.
 const SHORTEST: f64 = 4.0;
+/// Longest period of a motion, in lengths of the record.
+const LONGEST: f64 = 1e3;
 /// Most samples of the even grid, in rows of the log.
 const MOST: usize = 30;
 
@@ -206,7 +208,8 @@ impl Record {
 
         record.fill_dropped(&clock)?;
         record.check_channels(&joints)?;
-        record.drop_short_period(clock.step);
+        let duration = clock.t[clock.t.len() - 1] - clock.t[0];
+        record.drop_wrong_period(clock.step, duration);
         record.resample(&clock)?;
         record.check_period();
         Ok(record)
@@ -349,16 +352,22 @@ impl Record {
         Ok(())
     }
 
-    /// A stated period that samples cannot resolve is none.
-    fn drop_short_period(&mut self, step: f64) {
-        let Some(period) = self.period.filter(|p| *p < SHORTEST * step) else {
+    /// A stated period that samples cannot resolve, or that is far longer than the record of
+    /// `duration` seconds, is none.
+    fn drop_wrong_period(&mut self, step: f64, duration: f64) {
+        let Some(period) = self.period else { return };
+        let found = if period < SHORTEST * step {
+            format!("is shorter than {SHORTEST} samples ({step:.6} s each)")
+        } else if period > LONGEST * duration {
+            format!("is more than {LONGEST} times as long as the record ({duration:.3} s)")
+        } else {
             return;
         };
-        self.warnings.push(Warning::new(WarningKind::NotPeriodic,
+        self.warnings.push(Warning::new(
+            WarningKind::NotPeriodic,
             self.path.display().to_string(),
             format!(
-                "the stated period of {period} s is shorter than {SHORTEST} samples ({step:.6} s each): it is \
-                 treated as not periodic; period is in seconds"
+                "the stated period of {period} s {found}: it is treated as not periodic; period is in seconds"
             ),
         ));
         self.period = None;
@@ -368,8 +377,7 @@ impl Record {
     fn resample(&mut self, clock: &Clock) -> Result<()> {
         let (first, last) = (clock.t[0], clock.t[clock.t.len() - 1]);
         let mut step = clock.step;
-        // a period that the record does not nearly hold is judged later; it cannot shape the grid
-        if let Some(period) = self.period.filter(|p| *p < 1e3 * (last - first)) {
+        if let Some(period) = self.period {
             step = period / (period / step).round();
         }
         // time stamps that jitter may miss the last point of the grid by some of a step

@@ -312,7 +312,8 @@ fn fault(messages: &str) -> String {
         .unwrap_or("killed without a word");
     match line.contains("memory allocation") {
         true => "memory allocation failed".into(),
-        false => line.to_string(),
+        // without the number of the thread
+        false => line.split("panicked").last().unwrap_or(line).to_string(),
     }
 }
 

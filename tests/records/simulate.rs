@@ -450,7 +450,7 @@ fn the_command_writes_a_log_and_an_experiment_and_refuses_nonsense() {
         (&["--lead-in", "4000000000"], "too many steps"),
         (&["--step", "1e-300"], "too many steps"),
         (&["--rate", "1e9"], "can be simulated"),
-        (&["--monte-carlo", "1"], "at least 2"),
+        (&["--monte-carlo", "1"], "from 2 to"),
     ] {
         let other = at("other.csv");
         let args = [&["simulate", "planar2", &t, "--output", &other], more].concat();
