@@ -513,7 +513,7 @@ fn series_of_the_actuators_are_designed_judged_and_simulated() {
 /// The table of warnings in the documents is the list in the code.
 #[test]
 fn every_kind_of_warning_is_documented() {
-    let text = include_str!("../docs/formats.md");
+    let text = include_str!("../../docs/formats.md");
     let table = text.split("## Warnings").nth(1).unwrap();
     let table = table.split("\n## ").next().unwrap();
     let written: Vec<&str> = table
