@@ -20,7 +20,7 @@ pub fn reference(name: &str) -> (Value, Vec<Value>) {
     let read = |path: PathBuf| -> Value {
         serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap()
     };
-    match checks() {
+    match checks("only the cases in tests/data") {
         Some(folder) => {
             let cases = read(folder.join(format!("{name}_cases.json")));
             let model = read(folder.join(format!("{name}_model.json")));

@@ -594,6 +594,20 @@ fn recorded(name: &str) -> Option<Experiment> {
     Some(Experiment::read(folder.join("experiment.toml")).unwrap())
 }
 
+/// Without the recordings a test passes, and is not silent: the line is there although nothing asks for the output.
+#[test]
+fn a_test_without_its_recordings_says_so() {
+    let nothing = tempfile::tempdir().unwrap();
+    let out = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["identify::emps_gives_the_published_values", "--exact"])
+        .env("EXCITE_SHARED", nothing.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    assert!(said.contains("skipped: ../shared/data/emps"), "{said}");
+}
+
 #[test]
 fn emps_gives_the_published_values() {
     let Some(e) = recorded("emps") else { return };

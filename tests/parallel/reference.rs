@@ -165,7 +165,7 @@ fn h4_states(count: usize) -> Samples {
 /// the arms counted, no friction, relative to the torques of all rods.
 #[test]
 fn lumped_forearms_leave_what_the_reference_states() {
-    let Some(folder) = checks() else {
+    let Some(folder) = checks("skipped") else {
         return;
     };
     let text = std::fs::read_to_string(folder.join("h4_cases.json")).unwrap();
@@ -266,7 +266,7 @@ fn regular(model: &Value) -> GoughStewart {
 fn base_parameter_counts() {
     let (model, _) = reference("sg");
     // known counts; where the file is at hand each of its lines is looked up
-    let file: Option<Value> = checks().map(|f| {
+    let file: Option<Value> = checks("counts as known").map(|f| {
         let text = std::fs::read_to_string(f.join("base_parameter_counts.json")).unwrap();
         serde_json::from_str(&text).unwrap()
     });
