@@ -679,3 +679,44 @@ fn simulated_effects_have_the_names_of_the_catalogue() {
         t.fails(&format!("simulate planar2 t.json --{gone} 1"), 2, &[gone]);
     }
 }
+
+/// 1 for what cannot be done, 2 for arguments that cannot be used; nothing on standard output.
+#[test]
+fn every_command_keeps_to_the_exit_status() {
+    let t = Test::new().file("arm.toml", "urdf = 3");
+    for line in [
+        "design none.toml",
+        "design arm.toml",
+        "identifiability none.urdf",
+        "identifiability planar2 none.json",
+        "identify none.toml",
+        "diagnose none.toml",
+        "load none.toml",
+        "torque planar2 none.csv",
+        "simulate planar2 none.json",
+        "new none.urdf",
+    ] {
+        t.fails(line, 1, &["error: "]);
+    }
+    for line in [
+        "design",
+        "design no_such_robot",
+        "design planar2 --period 0",
+        "design planar2 --rate 1e300",
+        "identifiability",
+        "identify",
+        "identify e.toml --method magic",
+        "diagnose",
+        "load",
+        "load e.toml --cutoff -1",
+        "torque planar2",
+        "simulate planar2",
+        "new",
+        "new arm.toml",
+        "robots --nonsense",
+        "nonsense",
+    ] {
+        t.fails(line, 2, &[]);
+    }
+    assert!(!t.path().join("out").exists(), "a failure makes no folder");
+}
