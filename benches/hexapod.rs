@@ -2,7 +2,7 @@
 
 use excite::dynamics::{Samples, Workspace};
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart, Leg, joint_frame};
-use excite::mechanism::{ClosedMotion, ClosedWorkspace, TaskDerivatives};
+use excite::mechanism::{MechanismMotion, MechanismWorkspace, TaskDerivatives};
 use excite::robot::{Inertia, Limits};
 use nalgebra::{Matrix3, Vector3};
 use std::time::Instant;
@@ -66,12 +66,12 @@ fn main() -> excite::Result<()> {
     let ws = Workspace::default();
     let columns = mechanism.parameters.raw_count();
     println!("{columns} columns, {count} samples, {:?}", ws.isa());
-    let mut closed = ClosedMotion::default();
+    let mut closed = MechanismMotion::default();
     let isa = ws.isa();
     let mut failed = Ok(());
     let kinematics = best(&mut || failed = mechanism.motion_into(isa, &x, &mut closed));
     let mut w = vec![0.0; 6 * count * columns];
-    let (mut cache, part) = (ClosedWorkspace::default(), count.min(64));
+    let (mut cache, part) = (MechanismWorkspace::default(), count.min(64));
     let blocks = best(&mut || {
         for from in (0..count).step_by(part) {
             failed = mechanism
@@ -83,7 +83,7 @@ fn main() -> excite::Result<()> {
     println!("kinematics and G             {kinematics:6.2} us a sample");
     println!("with regressor, in the cache {blocks:6.2} us a sample");
     println!("with regressor, stacked as W {regressor:6.2} us a sample");
-    let (mut ws, mut out) = (ClosedWorkspace::default(), TaskDerivatives::default());
+    let (mut ws, mut out) = (MechanismWorkspace::default(), TaskDerivatives::default());
     let (raw, rates) = (vec![0.1; columns], vec![0.3; 6 * count]);
     let gradient = best(&mut || failed = mechanism.gradients(&mut ws, &raw, &x, &rates, &mut out));
     println!("gradient of one quadratic form {gradient:6.2} us a sample");

@@ -1,19 +1,18 @@
 //! The main job as a library call: a robot, a trajectory, a proof.
 
 use excite::design::{Settings, design};
-use excite::identifiability::Assessment;
-use excite::{Error, Robot};
-use std::sync::atomic::AtomicBool;
+use excite::identifiability::assess;
+use excite::{Error, Plant};
 
 fn main() -> Result<(), Error> {
-    let robot = Robot::load("ur10e")?;
+    let plant = Plant::load("ur10e")?;
     let settings = Settings {
         starts: Some(4),
         ..Settings::default()
     };
-    let result = design(&robot, &settings, &AtomicBool::new(false), &|_| {})?;
+    let result = design(&plant, &settings)?;
 
-    let report = Assessment::new(&result.robot, &result.trajectory)?;
+    let report = assess(&result.plant, Some(&result.trajectory))?;
     let Some(excitation) = &report.excitation else {
         return Ok(());
     };

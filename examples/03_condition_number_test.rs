@@ -3,24 +3,24 @@
 //!
 //! `cargo test --release --example 03_condition_number_test`
 
-use excite::identifiability::{Assessment, Excitation};
+use excite::identifiability::Excitation;
 use excite::trajectory::Trajectory;
-use excite::{Error, Robot};
+use excite::{Error, Plant};
 
-fn assess() -> Result<Excitation, Error> {
-    let robot = Robot::load("panda")?;
+fn excitation() -> Result<Excitation, Error> {
+    let plant = Plant::load("panda")?;
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/trajectories/panda/trajectory.json"
     );
     let trajectory = Trajectory::read(path)?;
-    Assessment::new(&robot, &trajectory)?
+    excite::identifiability::assess(&plant, Some(&trajectory))?
         .excitation
         .ok_or_else(|| Error::Argument("no trajectory".into()))
 }
 
 fn main() -> Result<(), Error> {
-    let e = assess()?;
+    let e = excitation()?;
     println!(
         "condition number {:.3}, limits hold: {}",
         e.condition.invariant, e.certificate.satisfied

@@ -99,7 +99,7 @@ fn main() -> excite::Result<()> {
     for joint in &mut robot.joints {
         joint.terms = [0.3, 5.0, 4.0, 0.5];
     }
-    let plant = Plant::Serial(robot);
+    let plant = Plant::from(robot);
     // the robot is not its CAD model: every body and term is off by up to a quarter
     let mut r = ChaCha8Rng::seed_from_u64(3);
     let mut phi = plant.values();

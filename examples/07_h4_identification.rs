@@ -4,7 +4,7 @@
 //!
 //! `cargo run --release --example 07_h4_identification`
 
-use excite::design::{Condition, Settings as Design, design_plant};
+use excite::design::{Condition, Settings as Design, design};
 use excite::identify::{Settings, identify};
 use excite::log::{Purpose, Record};
 use excite::mechanism::{Mechanism, bundled};
@@ -12,7 +12,6 @@ use excite::simulate::record::{Sensors, measure, to_record};
 use excite::simulate::{Run, Settings as Simulation, simulate};
 use excite::trajectory::Ends;
 use excite::{Plant, Result};
-use std::sync::atomic::AtomicBool;
 
 /// Period of the motions, s.
 const PERIOD: f64 = 2.0;
@@ -68,7 +67,7 @@ fn h4(replacements: &[(&str, &str)]) -> Result<Plant> {
         text = text.replace(from, to);
     }
     let mechanism = Mechanism::from_toml_str(&text, "h4")?;
-    Ok(Plant::Parallel(Box::new(mechanism)))
+    Ok(Plant::from(mechanism))
 }
 
 /// A designed motion, run by the true robot and measured.
@@ -87,7 +86,7 @@ fn record(
         seed,
         ..Design::default()
     };
-    let motion = design_plant(nominal, &settings, &AtomicBool::new(false), &|_| {})?.trajectory;
+    let motion = design(nominal, &settings)?.trajectory;
     let settings = Simulation {
         seed,
         step: 1e-3,

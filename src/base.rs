@@ -330,7 +330,7 @@ impl BaseParameters {
         match (self.standard[index].identifiability, column) {
             (Identifiability::Alone, _) => String::new(),
             (Identifiability::None, Column::Inertial { body, k }) => none_reason(robot, body, k),
-            (Identifiability::None, Column::Term { .. }) => String::new(),
+            (Identifiability::None, _) => String::new(),
             (Identifiability::Combination, _) => {
                 let partners = self.partners(index);
                 let mut text = if partners.is_empty() {

@@ -16,13 +16,12 @@
 //!
 //! ```
 //! use excite::design::{Settings, design};
-//! use excite::identifiability::Assessment;
-//! use std::sync::atomic::AtomicBool;
+//! use excite::identifiability::assess;
 //!
-//! let robot = excite::Robot::load("planar2")?; // a bundled name, a robot.toml or a URDF
+//! let plant = excite::Plant::load("planar2")?; // a bundled name, a robot.toml or a URDF
 //! let settings = Settings { starts: Some(2), ..Settings::default() };
-//! let result = design(&robot, &settings, &AtomicBool::new(false), &|_| {})?;
-//! let report = Assessment::new(&result.robot, &result.trajectory)?;
+//! let result = design(&plant, &settings)?;
+//! let report = assess(&result.plant, Some(&result.trajectory))?;
 //! let excitation = report.excitation.expect("a trajectory was given");
 //! assert!(excitation.certificate.satisfied && excitation.condition.invariant < 3.0);
 //! # Ok::<(), excite::Error>(())

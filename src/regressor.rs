@@ -101,6 +101,26 @@ pub fn torque_function<'a>(
     robot: &'a Robot,
     tree: &'a Tree,
 ) -> impl Fn(&[f64], &[f64], &[f64], &mut [f64]) + 'a {
+    state_torque(robot, tree, joint_torque)
+}
+
+/// The part of it that has derivatives: all but Coulomb friction.
+pub fn smooth_torque_function<'a>(
+    robot: &'a Robot,
+    tree: &'a Tree,
+) -> impl Fn(&[f64], &[f64], &[f64], &mut [f64]) + 'a {
+    state_torque(robot, tree, |joint, [_, qd, qdd]| {
+        let [armature, viscous, _, offset] = joint.terms;
+        armature * qdd + viscous * qd + offset
+    })
+}
+
+/// Torque of the bodies in one state, and of each joint what `own` says.
+fn state_torque<'a>(
+    robot: &'a Robot,
+    tree: &'a Tree,
+    own: impl Fn(&Joint, [f64; 3]) -> f64 + 'a,
+) -> impl Fn(&[f64], &[f64], &[f64], &mut [f64]) + 'a {
     let phi: Vec<f64> = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
     let memory = std::cell::RefCell::new((
         crate::dynamics::Workspace::default(),
@@ -113,7 +133,7 @@ pub fn torque_function<'a>(
         s.qdd.copy_from_slice(qdd);
         tree.inverse_dynamics(ws, &phi, s, tau);
         for (j, joint) in robot.joints.iter().enumerate() {
-            tau[j] += joint_torque(joint, s.at(j, 0));
+            tau[j] += own(joint, s.at(j, 0));
         }
     }
 }

@@ -4,9 +4,8 @@ mod diagnostic;
 
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::design::diagnostic::PERIODS;
-use excite::design::{Condition, Criterion, Progress, Settings, design_plant};
-use excite::dynamics::Tree;
-use excite::identifiability::Assessment;
+use excite::design::{Condition, Control, Criterion, Progress, Settings, design_with};
+use excite::identifiability::assess;
 use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;
 use excite::trajectory::samples::write_samples;
@@ -125,17 +124,14 @@ pub fn run(args: Args) -> Result<()> {
         ends: args.ends,
         start: args.start,
         criterion: args.criterion,
-        condition: args.condition.unwrap_or(match plant {
-            Plant::Serial(_) => Condition::Invariant,
-            Plant::Parallel(_) => Condition::Normalised,
-        }),
+        condition: args.condition.unwrap_or(Condition::usual(&plant)),
         derate: args.derate,
         seed: args.seed,
         starts: args.starts,
         time_limit: args.time_limit,
         threads: args.threads,
     };
-    settings.check(&plant.moved())?;
+    settings.check(plant.moved())?;
     let length = args.rate * settings.period * f64::from(settings.periods);
     if !(args.rate > 0.0 && args.rate.is_finite() && length <= 1e7) {
         return Err(Error::Argument(format!(
@@ -173,16 +169,17 @@ pub fn run(args: Args) -> Result<()> {
         });
         bar.set_message(format!("{} starts, best {:.4}", p.starts, p.best));
     };
-    let result = design_plant(&plant, &settings, &interrupt, &progress);
+    let control = Control {
+        cancel: &interrupt,
+        progress: &progress,
+    };
+    let result = design_with(&plant, &settings, &control);
     bar.finish_and_clear();
     let result = result?;
 
     // with the limits that were assumed
-    let plant = match plant {
-        Plant::Serial(_) => Plant::Serial(result.robot),
-        parallel => parallel,
-    };
-    let assessment = Assessment::with_plant(&plant, &result.trajectory)?;
+    let plant = result.plant;
+    let assessment = assess(&plant, Some(&result.trajectory))?;
     warn(&assessment.warnings);
     result.trajectory.write(&files[0], args.force)?;
     samples(&plant, &result.trajectory, &files[1], args.force, args.rate)?;
@@ -236,13 +233,12 @@ fn samples(
     rate: f64,
 ) -> Result<()> {
     let (fourier, periods) = (&trajectory.fourier, trajectory.periods);
-    match plant {
-        Plant::Serial(robot) => {
-            let tree = Tree::new(robot);
-            let torque = excite::regressor::torque_function(robot, &tree);
+    match plant.mechanism() {
+        None => {
+            let torque = excite::regressor::torque_function(plant.robot(), plant.tree());
             write_samples(path, force, fourier, periods, rate, Some(&torque))?;
         }
-        Plant::Parallel(mechanism) => {
+        Some(mechanism) => {
             mechanism.write_motion(path, force, fourier, periods, rate)?;
         }
     }

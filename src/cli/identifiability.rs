@@ -1,8 +1,7 @@
 //! `excite identifiability ROBOT [TRAJECTORY]`.
 
 use super::{load, pretty, print, summary::summary, warn, write};
-use excite::identifiability::Assessment;
-use excite::identifiability::{json::json, page};
+use excite::identifiability::{assess, json::json, page};
 use excite::output::prepare_dir;
 use excite::trajectory::Trajectory;
 use excite::{Error, Result};
@@ -48,14 +47,11 @@ pub fn run(args: Args) -> Result<()> {
         plant = plant
             .in_space(t.space)
             .map_err(|e| Error::file(path, "coordinates", e.to_string()))?;
-        t.matches(&plant.moved())
+        t.matches(plant.moved())
             .map_err(|e| Error::file(path, "", e.to_string()))?;
     }
     let files = prepare_dir(&args.output, &["report.json", "report.html"], args.force)?;
-    let assessment = match &trajectory {
-        Some(t) => Assessment::with_plant(&plant, t)?,
-        None => Assessment::of_plant(&plant)?,
-    };
+    let assessment = assess(&plant, trajectory.as_ref())?;
     warn(&assessment.warnings);
     let json = json(&assessment, None, begin.elapsed().as_secs_f64());
     write(&files[0], args.force, &pretty(&json))?;

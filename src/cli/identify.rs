@@ -180,25 +180,31 @@ fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> 
             }
         }
     }
-    match plant {
-        Plant::Serial(robot) => {
-            let none = robot.joints.iter().all(|j| !j.identify.contains(&true));
-            if asked.is_none() && none {
-                notes.push(Warning::new(WarningKind::JointTermsAssumed,
-                    &robot.name,
-                    "its file lists no joint terms to identify; viscous and Coulomb friction and offset were \
-                     identified for every joint (--identify none leaves them out)",
-                ));
-                terms = vec![JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
-            } else if asked.is_none() {
-                return Ok(Plant::Serial(robot));
-            }
-            Ok(Plant::Serial(robot.with_terms(&terms)))
+    if plant.mechanism().is_some() {
+        return match asked {
+            Some(_) => Err(Error::Argument(
+                "--identify is for serial robots; list the terms of a parallel one in its file"
+                    .into(),
+            )),
+            None => Ok(plant),
+        };
+    }
+    let none = plant
+        .actuators()
+        .iter()
+        .all(|j| !j.identify.contains(&true));
+    match asked {
+        Some(_) => Ok(plant.with_terms(&terms)),
+        None if none => {
+            notes.push(Warning::new(
+                WarningKind::JointTermsAssumed,
+                plant.name(),
+                "its file lists no joint terms to identify; viscous and Coulomb friction and offset were \
+                 identified for every joint (--identify none leaves them out)",
+            ));
+            Ok(plant.with_terms(&[JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset]))
         }
-        Plant::Parallel(_) if asked.is_some() => Err(Error::Argument(
-            "--identify is for serial robots; list the terms of a parallel one in its file".into(),
-        )),
-        other => Ok(other),
+        None => Ok(plant),
     }
 }
 

@@ -109,7 +109,7 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
             }
         }
     }
-    plant.with_terms(&terms)
+    Ok(plant.with_terms(&terms))
 }
 
 /// Writes a text file into a prepared directory.

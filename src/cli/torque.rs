@@ -30,11 +30,11 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let plant = Plant::load(&args.robot)?;
     super::warn(plant.warnings());
-    let (t, motion) = match &plant {
-        Plant::Serial(robot) => {
-            let samples = read_samples(&args.samples, robot.dof())?;
+    let (t, motion) = match plant.mechanism() {
+        None => {
+            let samples = read_samples(&args.samples, plant.coordinates())?;
             let motion = Samples {
-                dof: robot.dof(),
+                dof: plant.coordinates(),
                 count: samples.len(),
                 q: samples.q.concat(),
                 qd: samples.qd.concat(),
@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<()> {
             };
             (samples.t, motion)
         }
-        Plant::Parallel(mechanism) => mechanism.read_motion(&args.samples)?,
+        Some(mechanism) => mechanism.read_motion(&args.samples)?,
     };
     let tau = plant.nominal_torque(&motion)?;
     let actuators = plant.actuated().len();

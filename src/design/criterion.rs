@@ -25,6 +25,7 @@
 
 use super::information::{Evaluation, Information};
 use crate::error::{Error, Result};
+use crate::plant::Plant;
 use faer::{Mat, Side};
 
 /// What is minimised.
@@ -56,6 +57,17 @@ pub enum Condition {
     Normalised,
     /// the same with rows divided by the torque noise
     Weighted,
+}
+
+impl Condition {
+    /// What is usual for a plant: the invariant condition number of a tree; unit columns for a closed
+    /// chain, whose parameters differ by many orders of magnitude in size.
+    pub fn usual(plant: &Plant) -> Self {
+        match plant.mechanism() {
+            None => Condition::Invariant,
+            Some(_) => Condition::Normalised,
+        }
+    }
 }
 
 /// Group of extreme eigenvalues: `A_0 + Σ_k δ_k A_k`, in units of the extreme one.

@@ -13,11 +13,9 @@
 //! allow.
 
 use super::settings::Settings;
-use crate::dynamics::{Samples, Tree};
+use crate::dynamics::Samples;
 use crate::error::{Error, Result};
-use crate::identifiability::certificate;
 use crate::log::Purpose;
-use crate::mechanism::closed_certificate;
 use crate::plant::Plant;
 use crate::robot::Robot;
 use crate::trajectory::{Basis, Fourier, Grid, Trajectory};
@@ -50,18 +48,16 @@ pub struct Motion {
     pub trajectory: Trajectory,
 }
 
-/// The set about a designed motion of `robot` (the coordinates of `plant` with their limits), inside
-/// the limits times [`Settings::derate`].
+/// The set about a designed motion, inside the limits times [`Settings::derate`].
 ///
 /// # Errors
 /// [`Error::Infeasible`] where no motion of the set keeps the limits.
 pub fn diagnostic_set(
     plant: &Plant,
-    robot: &Robot,
     main: &Trajectory,
     settings: &Settings,
 ) -> Result<Vec<Motion>> {
-    let limits = Checker::new(plant, robot, settings.derate);
+    let limits = Checker::new(plant, settings.derate);
     let motion = |name, about, purpose, trajectory: Trajectory| -> Result<Motion> {
         Ok(Motion {
             name,
@@ -100,38 +96,24 @@ pub fn diagnostic_set(
 }
 
 /// The limits of a robot times a fraction, for all time.
-pub(crate) struct Checker<'a> {
-    plant: &'a Plant,
+pub(crate) struct Checker {
+    plant: Plant,
     /// coordinates with limits times the fraction
     robot: Robot,
-    tree: Tree,
     derate: f64,
 }
 
-impl<'a> Checker<'a> {
-    /// Of `robot`, the coordinates of `plant` with their limits.
-    pub(crate) fn new(plant: &'a Plant, robot: &Robot, derate: f64) -> Self {
-        let mut robot = robot.clone();
-        for joint in &mut robot.joints {
-            let l = &mut joint.limits;
-            let [low, high] = l.position;
-            if low.is_finite() && high.is_finite() {
-                let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * derate);
-                l.position = [middle - half, middle + half];
-            }
-            for limit in [
-                &mut l.velocity,
-                &mut l.acceleration,
-                &mut l.jerk,
-                &mut l.effort,
-            ] {
-                *limit *= derate;
-            }
-        }
+impl Checker {
+    /// Of a plant, with the limits that a design assumes where none are stated.
+    pub(crate) fn new(plant: &Plant, derate: f64) -> Self {
+        let plant = plant.clone().with_assumed_limits();
+        let moved = plant.moved();
         Checker {
+            robot: Robot {
+                joints: moved.joints.iter().map(|j| j.derated(derate)).collect(),
+                ..moved.clone()
+            },
             plant,
-            tree: Tree::new(&robot),
-            robot,
             derate,
         }
     }
@@ -169,14 +151,11 @@ impl<'a> Checker<'a> {
         if !self.sampled(fourier)? {
             return Ok(false);
         }
-        let certified = match self.plant {
-            Plant::Serial(_) => certificate(&self.robot, &self.tree, fourier).map(|c| c.satisfied),
-            Plant::Parallel(m) => closed_certificate(m, fourier, self.derate).map(|c| c.satisfied),
-        };
-        match certified {
+        match self.plant.certify(fourier, self.derate) {
+            Ok(certified) => Ok(certified.satisfied()),
             // out of reach
             Err(Error::Infeasible(_)) => Ok(false),
-            other => other,
+            Err(e) => Err(e),
         }
     }
 
@@ -213,9 +192,9 @@ fn random_path(
     let lines = Grid::Odd.harmonics(harmonics, settings.seed);
     let dof = main.fourier.dof();
     let basis = Basis::new(&lines, settings.ends, dof, settings.start.as_deref())?;
-    let middle: Vec<f64> = match limits.plant {
-        Plant::Serial(_) => main.fourier.joints.iter().map(|s| s.constant).collect(),
-        Plant::Parallel(m) => m.home.clone(),
+    let middle: Vec<f64> = match limits.plant.home() {
+        None => main.fourier.joints.iter().map(|s| s.constant).collect(),
+        Some(home) => home.to_vec(),
     };
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     rng.set_stream(stream);

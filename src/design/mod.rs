@@ -13,12 +13,11 @@
 //! numbers and rounds are compared in a fixed order, so the result is the same for the same seed
 //! whatever the number of threads, unless a time limit ends the run.
 
-mod closed;
-mod closed_limits;
 pub mod criterion;
 pub mod diagnostic;
 pub mod information;
 pub mod limits;
+mod mechanism_limits;
 pub mod path;
 pub mod record;
 pub mod settings;
@@ -31,17 +30,14 @@ pub use record::{Record, Status};
 pub use settings::Settings;
 
 use crate::base::BaseParameters;
-use crate::dynamics::Tree;
-use crate::error::{Error, Result, Warning, WarningKind};
-use crate::identifiability::{certificate, torque_noise};
-use crate::mechanism::{Mechanism, PosePeak, closed_certificate};
+use crate::error::{Error, Result};
 use crate::plant::Plant;
-use crate::robot::{JointTerm, Motion, Robot};
-use crate::trajectory::{Basis, Certificate, Fourier, Space, Trajectory};
-use closed_limits::ClosedLimits;
+use crate::robot::{JointTerm, Robot};
+use crate::trajectory::{Basis, Fourier, Trajectory};
 use criterion::Objective;
 use information::Information;
 use limits::Limits;
+use mechanism_limits::MechanismLimits;
 use path::PathLimits;
 use rayon::prelude::*;
 use solve::{Iterate, Phase, Stop, Task};
@@ -60,7 +56,7 @@ const NORMS: (f64, f64) = (10.0, 40.0);
 #[derive(Debug, Clone)]
 pub struct Design {
     /// the robot, with the limits that were assumed where it states none
-    pub robot: Robot,
+    pub plant: Plant,
     /// the trajectory, inside all limits for all time
     pub trajectory: Trajectory,
     /// criterion of the result (see [`record::Start::history`] for what it is)
@@ -82,173 +78,86 @@ pub struct Progress {
     pub seconds: f64,
 }
 
-/// Fills in limits that a robot does not state, each with a warning: ±π or ±0.5 m, 1 rad/s or
-/// 0.25 m/s, five times the velocity per second. Jerk and effort stay unlimited.
-pub fn with_assumed_limits(robot: &Robot) -> Robot {
-    let mut robot = robot.clone();
-    for joint in &mut robot.joints {
-        let l = &mut joint.limits;
-        let mut assumed = Vec::new();
-        let (reach, speed, unit) = match joint.motion {
-            Motion::Revolute => (std::f64::consts::PI, 1.0, "rad"),
-            Motion::Prismatic => (0.5, 0.25, "m"),
-        };
-        let [low, high] = l.position;
-        if !low.is_finite() || !high.is_finite() {
-            l.position = match (low.is_finite(), high.is_finite()) {
-                (true, _) => [low, low + 2.0 * reach],
-                (_, true) => [high - 2.0 * reach, high],
-                _ => [-reach, reach],
-            };
-            assumed.push(format!(
-                "position {:.4} to {:.4} {unit}",
-                l.position[0], l.position[1]
-            ));
-        }
-        if !l.velocity.is_finite() {
-            l.velocity = speed;
-            assumed.push(format!("velocity {speed} {unit}/s"));
-        }
-        if !l.acceleration.is_finite() {
-            l.acceleration = 5.0 * l.velocity;
-            assumed.push(format!("acceleration {} {unit}/s^2", l.acceleration));
-        }
-        if !assumed.is_empty() {
-            robot.warnings.push(Warning::new(
-                WarningKind::LimitsMissing,
-                joint.name.clone(),
-                format!(
-                    "limits not stated, assumed for the design: {}",
-                    assumed.join(", ")
-                ),
-            ));
-        }
-        if !joint.limits.effort.is_finite() {
-            robot.warnings.push(Warning::new(
-                WarningKind::LimitsMissing,
-                joint.name.clone(),
-                "no effort limit stated: its torque is not limited in the design",
-            ));
-        }
-    }
-    robot
+/// What a design tells while it runs, and what ends it early.
+pub struct Control<'a> {
+    /// ends the run when set; the best feasible trajectory so far is the result
+    pub cancel: &'a AtomicBool,
+    /// called after every finished start
+    pub progress: &'a (dyn Fn(Progress) + Sync),
 }
 
-/// Designs an exciting trajectory.
+impl Default for Control<'_> {
+    /// Never cancelled, and silent.
+    fn default() -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        fn silent(_: Progress) {}
+        Control {
+            cancel: &NEVER,
+            progress: &silent,
+        }
+    }
+}
+
+/// Designs an exciting trajectory: a Fourier series for each coordinate of the plant (the joints of
+/// a tree; the platform or the actuators of a closed chain), inside all limits for all time.
 ///
-/// `interrupt` ends the run early when set; `progress` is called after every finished start. In
-/// both cases, and when a time limit ends the run, the best feasible trajectory so far is
-/// returned.
+/// ```
+/// use excite::Plant;
+/// use excite::design::{Settings, design};
+///
+/// let plant = Plant::load("planar2")?;
+/// let settings = Settings { starts: Some(1), ..Settings::default() };
+/// let result = design(&plant, &settings)?;
+/// assert!(result.plant.certify(&result.trajectory.fourier, 1.0)?.satisfied());
+/// # Ok::<(), excite::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Argument`] for settings that cannot be, [`Error::Infeasible`] where no trajectory is
-/// inside the limits (torques at rest, say) or nothing can be identified.
-pub fn design(
-    robot: &Robot,
-    settings: &Settings,
-    interrupt: &AtomicBool,
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Design> {
-    settings.check(robot)?;
-    let begin = Instant::now();
-    let robot = with_assumed_limits(robot);
-    let base = BaseParameters::new(&robot)?;
-    something_to_identify(&robot.name, &base)?;
-    let basis = basis(&robot, settings)?;
-    let count = samples(&robot, &basis.harmonics);
-    let noise = torque_noise(&robot).0;
-    let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
-    let transform = transform(&base, settings);
-    let info = Information::new(&robot, &basis, settings.period, count, transform, weights);
-    let mut derated = robot.clone();
-    for joint in &mut derated.joints {
-        joint.limits.effort *= settings.derate;
-    }
-    let tree = Tree::new(&robot);
-    first_certified(|tighter| {
-        let torque = TorqueLimits::new(&robot, settings.derate * tighter);
-        Problem {
-            robot: &robot,
-            settings,
-            basis: &basis,
-            info: &info,
-            limits: Limits::new(&robot, &basis, settings.period, settings.derate),
-            path: torque.as_ref().map(|t| t as &dyn PathLimits),
-            space: None,
-            broken: &|fourier| {
-                let c = certificate(&derated, &tree, fourier)?;
-                Ok(beyond(c.satisfied, [&c], &[]))
-            },
-        }
-        .solve(begin, interrupt, progress)
-    })
+/// inside the limits (torques at rest, say), none that was found is certified, or nothing can be
+/// identified.
+pub fn design(plant: &Plant, settings: &Settings) -> Result<Design> {
+    design_with(plant, settings, &Control::default())
 }
 
-/// Designs an exciting trajectory of either kind of robot, see [`design`] and [`design_closed`].
-///
-/// # Errors
-/// As these.
-pub fn design_plant(
-    plant: &Plant,
-    settings: &Settings,
-    interrupt: &AtomicBool,
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Design> {
-    match plant {
-        Plant::Serial(robot) => design(robot, settings, interrupt, progress),
-        Plant::Parallel(mechanism) => design_closed(mechanism, settings, interrupt, progress),
-    }
-}
-
-/// Designs an exciting trajectory of a closed chain: a Fourier series for each task coordinate (of
-/// the platform, or of the actuators of [`Mechanism::in_actuators`] and of loops), inside the
-/// workspace box and the limits of actuators, passive joints and singularities. [`Design::robot`] has
-/// the task coordinates as its joints.
+/// [`design`] with progress and cancellation. When it is cancelled, and when a time limit ends the
+/// run, the best feasible trajectory so far is returned.
 ///
 /// # Errors
 /// As [`design`].
-pub fn design_closed(
-    mechanism: &Mechanism,
-    settings: &Settings,
-    interrupt: &AtomicBool,
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Design> {
-    let robot = mechanism.task_robot();
-    settings.check(&robot)?;
+pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Result<Design> {
+    settings.check(plant.moved())?;
     let begin = Instant::now();
-    let base = mechanism.base()?;
-    something_to_identify(&robot.name, &base)?;
-    let basis = basis(&robot, settings)?;
-    let count = samples(&mechanism.robot, &basis.harmonics);
-    let noise = torque_noise(&mechanism.actuator_robot()).0;
+    let plant = &plant.clone().with_assumed_limits();
+    let moved = plant.moved();
+    let base = plant.base()?;
+    something_to_identify(plant.name(), &base)?;
+    let basis = basis(moved, settings)?;
+    let count = samples(plant.robot(), &basis.harmonics);
+    let noise = plant.torque_noise().0;
     let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
     let transform = transform(&base, settings);
-    let info = Information::closed(
-        mechanism,
-        &basis,
-        settings.period,
-        count,
-        transform,
-        weights,
-    );
+    let (period, derate) = (settings.period, settings.derate);
+    let info = Information::new(plant, &basis, period, count, transform, weights);
     first_certified(|tighter| {
-        let derate = settings.derate * tighter;
-        let path = ClosedLimits::new(mechanism, derate, settings.period, count);
-        let limits = Limits::new(&robot, &basis, settings.period, settings.derate);
+        let share = derate * tighter;
+        let path: Option<Box<dyn PathLimits + '_>> = match plant.mechanism() {
+            None => TorqueLimits::new(plant.robot(), share).map(|t| Box::new(t) as _),
+            Some(m) => Some(Box::new(MechanismLimits::new(m, share, period, count))),
+        };
+        let mut limits = Limits::new(moved, &basis, period, derate);
+        if let Some(home) = plant.home() {
+            limits = limits.resting(home);
+        }
         Problem {
-            robot: &robot,
+            plant,
             settings,
             basis: &basis,
             info: &info,
-            limits: limits.resting(&mechanism.home),
-            path: Some(&path),
-            space: Some(mechanism.space()),
-            broken: &|fourier| {
-                let c = closed_certificate(mechanism, fourier, settings.derate)?;
-                Ok(beyond(c.satisfied, [&c.platform, &c.actuators], &c.pose))
-            },
+            limits,
+            path: path.as_deref(),
         }
-        .solve(begin, interrupt, progress)
+        .solve(begin, control)
     })
 }
 
@@ -277,25 +186,6 @@ fn first_certified(
 /// Steps by which a motion is shrunk until it is certified: to 82 % of its size at most.
 const SHRINKS: usize = 100;
 
-/// What a certificate finds broken, in words; `None` where all limits hold.
-fn beyond<'a>(
-    satisfied: bool,
-    certificates: impl IntoIterator<Item = &'a Certificate>,
-    pose: &[PosePeak],
-) -> Option<String> {
-    if satisfied {
-        return None;
-    }
-    let joints = certificates.into_iter().filter_map(|c| c.worst.as_ref());
-    let joints = joints.map(|w| (w.used, format!("{} of {}", w.kind.name(), w.joint)));
-    let pose = pose.iter().map(|p| (p.used, p.name.clone()));
-    let worst = joints.chain(pose).max_by(|a, b| a.0.total_cmp(&b.0));
-    Some(match worst {
-        Some((used, what)) => format!("{what} at {:.1} % of its limit", 100.0 * used),
-        None => "a limit that cannot be evaluated".into(),
-    })
-}
-
 fn something_to_identify(name: &str, base: &BaseParameters) -> Result<()> {
     match base.count() {
         0 => Err(Error::Infeasible(format!(
@@ -320,33 +210,24 @@ fn transform(base: &BaseParameters, settings: &Settings) -> faer::Mat<f64> {
     }
 }
 
-/// One problem of either kind.
+/// One problem.
 struct Problem<'a> {
-    /// what the series move, with its limits
-    robot: &'a Robot,
+    plant: &'a Plant,
     settings: &'a Settings,
     basis: &'a Basis,
     info: &'a Information<'a>,
     limits: Limits,
     path: Option<&'a dyn PathLimits>,
-    /// what the series move, of a closed chain
-    space: Option<Space>,
-    /// the limit that a motion breaks at some time, in words
-    broken: &'a dyn Fn(&Fourier) -> Result<Option<String>>,
 }
 
 impl Problem<'_> {
     /// The best trajectory that was found and certified, or what is broken in the best one.
-    fn solve(
-        &self,
-        begin: Instant,
-        interrupt: &AtomicBool,
-        progress: &(dyn Fn(Progress) + Sync),
-    ) -> Result<Result<Design, String>> {
-        let settings = self.settings;
+    fn solve(&self, begin: Instant, control: &Control) -> Result<Result<Design, String>> {
+        let Control { cancel, progress } = control;
+        let (settings, robot) = (self.settings, self.plant.moved());
         let (starts, time_limit) = settings.budget();
         let deadline = begin + Duration::from_secs_f64(time_limit.min(1e8));
-        let scale = start::scales(self.robot, settings.period);
+        let scale = start::scales(robot, settings.period);
         let objective = Objective {
             criterion: settings.criterion,
             condition: settings.condition,
@@ -359,13 +240,13 @@ impl Problem<'_> {
             scale: &scale,
             deadline: time_limit.is_finite().then_some(deadline),
         };
-        let halt = || interrupt.load(Ordering::Relaxed) || Instant::now() >= deadline;
+        let halt = || cancel.load(Ordering::Relaxed) || Instant::now() >= deadline;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(settings.threads)
             .build()
             .map_err(|e| Error::Argument(format!("threads: {e}")))?;
         let source = start::Source {
-            robot: self.robot,
+            robot,
             basis: self.basis,
             task: &task,
             seed: settings.seed,
@@ -387,7 +268,7 @@ impl Problem<'_> {
             }
             Ok(())
         })?;
-        let status = match (interrupt.load(Ordering::Relaxed), halt()) {
+        let status = match (cancel.load(Ordering::Relaxed), halt()) {
             (true, _) => Status::Interrupted,
             (_, true) => Status::TimeLimit,
             _ => Status::Converged,
@@ -401,17 +282,17 @@ impl Problem<'_> {
                 return Ok(Err(format!(
                     "{}: no trajectory inside all limits was found: the best one has {broken}; raise that \
                      limit, lower --derate, or choose a start posture or another --seed",
-                    self.robot.name
+                    self.plant.name()
                 )));
             }
         };
         let trajectory = Trajectory {
-            space: self.space,
+            space: self.plant.space(),
             periods: settings.periods,
             ends: settings.ends,
             grid: settings.grid,
             settings: serde_json::to_value(settings).unwrap_or_default(),
-            ..Trajectory::new(self.robot, fourier)
+            ..Trajectory::new(robot, fourier)
         };
         let record = Record {
             settings: settings.clone(),
@@ -421,7 +302,7 @@ impl Problem<'_> {
             seconds: begin.elapsed().as_secs_f64(),
         };
         Ok(Ok(Design {
-            robot: self.robot.clone(),
+            plant: self.plant.clone(),
             trajectory,
             value: iterate.value.exp(),
             record,
@@ -434,12 +315,12 @@ impl Problem<'_> {
     /// Otherwise what is broken in the motion as it came.
     fn settle(&self, x: &[f64]) -> Result<Result<Fourier, String>> {
         let first = self.basis.fourier(self.settings.period, x);
-        let Some(found) = (self.broken)(&first)? else {
+        let Some(found) = self.broken(&first)? else {
             return Ok(Ok(first));
         };
         let m = self.basis.free();
-        let rest = (0..self.robot.dof()).flat_map(|j| self.limits.rest_parameters(j));
-        let mean = (0..self.robot.dof()).flat_map(|j| {
+        let rest = (0..self.plant.coordinates()).flat_map(|j| self.limits.rest_parameters(j));
+        let mean = (0..self.plant.coordinates()).flat_map(|j| {
             let mut c = self.basis.coefficients(j, &x[j * m..(j + 1) * m]);
             c.rows_range_mut(1..).fill(0.0);
             self.basis.parameters(j, c.as_slice()).as_slice().to_vec()
@@ -451,7 +332,7 @@ impl Problem<'_> {
                     .zip(&centre)
                     .for_each(|(x, r)| *x = r + 0.998 * (*x - r));
                 let fourier = self.basis.fourier(self.settings.period, &x);
-                if (self.broken)(&fourier)?.is_none() {
+                if self.broken(&fourier)?.is_none() {
                     return Ok(Ok(fourier));
                 }
             }
@@ -459,9 +340,14 @@ impl Problem<'_> {
         Ok(Err(found))
     }
 
+    /// The limit that a motion breaks at some time, in words.
+    fn broken(&self, fourier: &Fourier) -> Result<Option<String>> {
+        Ok(self.plant.certify(fourier, self.settings.derate)?.broken())
+    }
+
     /// Why there is no feasible trajectory.
     fn infeasible(&self) -> String {
-        let rest: Vec<f64> = (0..self.robot.dof())
+        let rest: Vec<f64> = (0..self.plant.coordinates())
             .flat_map(|j| self.limits.rest_parameters(j))
             .collect();
         let mut motion = Default::default();
@@ -474,11 +360,11 @@ impl Problem<'_> {
             false => format!(
                 "{}: no feasible trajectory: at rest in the middle of its range {broken}; check \
                  masses, gravity, the limit, or choose a start posture",
-                self.robot.name
+                self.plant.name()
             ),
             true => format!(
                 "{}: no feasible trajectory was found; check the limits and the start posture",
-                self.robot.name
+                self.plant.name()
             ),
         }
     }

@@ -7,7 +7,7 @@
 
 use super::information::{Evaluation, Information};
 use crate::dynamics::{Samples, Workspace};
-use crate::mechanism::{ClosedWorkspace, TaskDerivatives};
+use crate::mechanism::{MechanismWorkspace, TaskDerivatives};
 
 /// Limits along a motion.
 pub trait PathLimits: Sync {
@@ -39,7 +39,7 @@ pub struct PathMemory {
     /// torques
     pub tau: Vec<f64>,
     /// of closed chains
-    pub closed: ClosedWorkspace,
+    pub mechanism: MechanismWorkspace,
     /// gradients of closed chains
     pub task: TaskDerivatives,
 }

@@ -2,7 +2,7 @@
 
 use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::mechanism::Mechanism;
+use crate::plant::Plant;
 
 /// Task coordinates at every sample, by forward kinematics from the home pose onwards; velocities
 /// and accelerations from `ẋ = D_a⁺ q̇_a` through central differences of the pose, which is as smooth
@@ -11,11 +11,10 @@ use crate::mechanism::Mechanism;
 ///
 /// # Errors
 /// Actuator positions that no pose near the one before gives.
-pub fn coordinates(
-    mechanism: &Mechanism,
-    actuators: &Samples,
-    cycle: Option<usize>,
-) -> Result<Samples> {
+pub fn coordinates(plant: &Plant, actuators: &Samples, cycle: Option<usize>) -> Result<Samples> {
+    let Some(mechanism) = plant.mechanism() else {
+        return Ok(actuators.clone());
+    };
     let (m, n) = (mechanism.freedoms(), actuators.dof);
     let count = cycle.unwrap_or(actuators.count);
     let mut out = Samples::zeros(m, count);

@@ -42,10 +42,11 @@ pub type Closeness = [f64; 2];
 pub fn factors(data: &Data, closeness: Closeness) -> Vec<f64> {
     let of = |kind: &Kind| match kind {
         Kind::Inertial { k, .. } => closeness[usize::from(*k > 3)],
-        Kind::Term { joint, term } if *joint != usize::MAX && *term == JointTerm::Armature => {
-            closeness[0]
-        }
-        Kind::Term { .. } => 1.0,
+        Kind::Term {
+            term: JointTerm::Armature,
+            ..
+        } => closeness[0],
+        Kind::Term { .. } | Kind::Nuisance => 1.0,
     };
     data.parameters.iter().map(|p| of(&p.kind)).collect()
 }

@@ -163,10 +163,7 @@ impl Signals {
             let Some(actuators) = &r.reference else {
                 continue;
             };
-            along.push(match data.plant.mechanism() {
-                None => actuators.clone(),
-                Some(m) => closed::coordinates(m, actuators, r.cycle)?,
-            });
+            along.push(closed::coordinates(data.plant, actuators, r.cycle)?);
         }
         // error of the coordinates and of the actuators, with derivative and integral
         let errors = |commanded: &Samples, x: &Samples, dt: f64| -> Vec<[Vec<f64>; 3]> {

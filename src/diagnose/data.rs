@@ -8,7 +8,6 @@ use super::noise::{LINES, Noise, between_periods, spectrum};
 use super::record::Record;
 use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::mechanism::Mechanism;
 use crate::plant::{Kind, Parameter, Plant};
 use crate::robot::{JointTerm, Prior};
 use faer::Mat;
@@ -134,7 +133,7 @@ impl<'a> Data<'a> {
         }
         let fitted = records.iter().filter(|r| r.fit).map(|r| r.count).sum();
         let rows = start[records.len()];
-        let parameters = plant.parameters();
+        let parameters = plant.parameters().to_vec();
         let p = parameters.len();
         let mut w: Vec<Mat<f64>> = (0..n).map(|_| Mat::zeros(rows, p)).collect();
         let mut known = vec![vec![0.0; rows]; n];
@@ -219,7 +218,7 @@ impl<'a> Data<'a> {
             let Some(j) = actuated.iter().position(|a| *a == joint) else {
                 continue;
             };
-            if self.plant.mechanism().is_some_and(redundant) {
+            if self.plant.redundant() {
                 // friction of one drive acts on others, too: left as it is
                 continue;
             }
@@ -482,6 +481,8 @@ impl<'a> Data<'a> {
                     }
                     .max(0.02 * noise)
                 }
+                // each states its own
+                Kind::Nuisance => 0.0,
             })
             .collect()
     }
@@ -510,11 +511,9 @@ impl<'a> Data<'a> {
                 name: (*name).to_string(),
                 unit: "",
                 value: 0.0,
-                // no joint of the robot: not an unknown of the nominal model
-                kind: Kind::Term {
-                    joint: usize::MAX,
-                    term: JointTerm::Offset,
-                },
+                // not an unknown of the nominal model
+                kind: Kind::Nuisance,
+                raw: Vec::new(),
             });
             self.spread.push(*spread);
         }
@@ -524,7 +523,7 @@ impl<'a> Data<'a> {
     /// that are not perfectly sharp, and a motion close to them that friction bends faster than
     /// positions show.
     pub fn ordinary(&mut self) {
-        if self.plant.mechanism().is_some_and(redundant) {
+        if self.plant.redundant() {
             return;
         }
         let mut nuisances = Vec::new();
@@ -580,7 +579,7 @@ impl<'a> Data<'a> {
             .zip(phi)
             .map(|(p, v)| match p.kind {
                 Kind::Inertial { .. } => *v,
-                Kind::Term { .. } => 0.0,
+                Kind::Term { .. } | Kind::Nuisance => 0.0,
             })
             .collect();
         (0..self.joints())
@@ -608,7 +607,7 @@ impl<'a> Data<'a> {
                 let r = &self.records[k];
                 let mut x = r.x.clone();
                 change(r, k, &mut x);
-                rigid(self.plant, &self.parameters, phi, &x)
+                rigid(self.plant, phi, &x)
             })
             .collect();
         let mut out = vec![Vec::with_capacity(self.rows()); n];
@@ -630,44 +629,8 @@ impl<'a> Data<'a> {
 ///
 /// # Errors
 /// Poses that cannot be reached.
-pub fn rigid(
-    plant: &Plant,
-    parameters: &[Parameter],
-    phi: &[f64],
-    x: &Samples,
-) -> Result<Vec<f64>> {
-    match plant {
-        Plant::Serial(robot) => {
-            let bodies = &phi[..10 * robot.bodies.len()];
-            let mut tau = vec![0.0; x.dof * x.count];
-            crate::dynamics::Tree::new(robot).inverse_dynamics(
-                &mut Default::default(),
-                bodies,
-                x,
-                &mut tau,
-            );
-            Ok(tau)
-        }
-        Plant::Parallel(_) => {
-            let bodies: Vec<f64> = parameters
-                .iter()
-                .zip(phi)
-                .map(|(p, v)| match p.kind {
-                    Kind::Inertial { .. } => *v,
-                    Kind::Term { .. } => 0.0,
-                })
-                .collect();
-            let w = plant.regressor(x)?;
-            let y = &w * faer::ColRef::from_slice(&bodies[..w.ncols()]);
-            Ok((0..w.nrows()).map(|i| y[i]).collect())
-        }
-    }
-}
-
-/// Whether a closed chain has more actuators than freedoms: generalised forces of one actuator then
-/// spread over all.
-fn redundant(mechanism: &Mechanism) -> bool {
-    mechanism.actuators() > mechanism.freedoms()
+pub fn rigid(plant: &Plant, phi: &[f64], x: &Samples) -> Result<Vec<f64>> {
+    plant.rigid_torque(x, &phi[..plant.parameters().len()])
 }
 
 /// Smooth sign.
@@ -753,7 +716,6 @@ pub fn from_fine(values: &[f64], count: usize, out: &mut Vec<f64>) {
 fn inertia(plant: &Plant, record: &Record) -> Result<Vec<f64>> {
     let n = plant.actuators().len();
     let phi = plant.values();
-    let parameters = plant.parameters();
     let m = plant.coordinates();
     const POINTS: usize = 8;
     let mut out = vec![0.0f64; n];
@@ -764,11 +726,11 @@ fn inertia(plant: &Plant, record: &Record) -> Result<Vec<f64>> {
             x.q[k * POINTS + i] = record.x.q[k * record.count + at(i)];
         }
     }
-    let rest = rigid(plant, &parameters, &phi, &x)?;
+    let rest = rigid(plant, &phi, &x)?;
     for k in 0..m {
         let mut y = x.clone();
         y.qdd[k * POINTS..(k + 1) * POINTS].fill(1.0);
-        let tau = rigid(plant, &parameters, &phi, &y)?;
+        let tau = rigid(plant, &phi, &y)?;
         for j in 0..n {
             for i in 0..POINTS {
                 out[j] += (tau[j * POINTS + i] - rest[j * POINTS + i]).powi(2) / POINTS as f64;

@@ -173,13 +173,8 @@ impl Record {
             let exact = vec![0.0; n];
             differentiated(&grid(columns, stamped), &exact, count, cycle, dt).0
         });
-        let (x, actuators) = match plant.mechanism() {
-            None => (motion.clone(), motion),
-            Some(mechanism) => {
-                let x = super::closed::coordinates(mechanism, &motion, cycle)?;
-                (x, motion)
-            }
-        };
+        let x = super::closed::coordinates(plant, &motion, cycle)?;
+        let actuators = motion;
         Ok(Record {
             name: raw.name.clone(),
             fit: raw.fit,

@@ -204,7 +204,7 @@ fn platform(p: &Platform) -> Value {
         "box": c.platform.joints.iter().map(joint).collect::<Vec<_>>(),
         "pose": c.pose,
         "singularity": { "actuation": optional(least(0)), "constraint": optional(least(1)) },
-        "proven": c.proven,
+        "proven": c.proven(),
         "satisfied": c.satisfied,
     })
 }

@@ -11,29 +11,20 @@
 //! (white noise, independent between samples and joints; Swevers et al. 1997, eq. 11), whose
 //! diagonal gives the predicted standard deviation of every base parameter.
 
-mod closed;
 pub mod json;
 pub mod page;
+mod platform;
+
+pub use platform::Platform;
 
 use crate::base::BaseParameters;
-use crate::dynamics::{Samples, Tree};
+use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::mechanism::{ClosedCertificate, PoseUse, Segment, Task};
 use crate::plant::Plant;
-use crate::regressor::{Regressor, nominal_torque};
 use crate::robot::Robot;
-use crate::trajectory::certificate::{Certificate, certify};
-use crate::trajectory::torque::torque_certificate;
-use crate::trajectory::{Fourier, Space, Trajectory};
+use crate::trajectory::{Certificate, Proof, Trajectory, sample_period};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
-
-/// Rate of the samples that condition numbers and predictions refer to, Hz.
-pub const RATE: f64 = 100.0;
-
-/// Torque noise assumed where a robot file states none, as a fraction of the effort limit (or of
-/// 100 N m where there is none either).
-pub const DEFAULT_NOISE: f64 = 0.01;
 
 /// The four condition numbers of one trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -70,7 +61,7 @@ pub struct Prediction {
 pub struct Excitation {
     /// the trajectory
     pub trajectory: Trajectory,
-    /// one period at [`RATE`], the end point left out
+    /// one period at [`RATE`](crate::trajectory::RATE), the end point left out
     pub motion: Samples,
     /// nominal torque at these samples, joint-major
     pub torque: Vec<f64>,
@@ -89,27 +80,6 @@ pub struct Excitation {
     /// of a parallel robot, what its platform does; `motion` and `certificate` are then about the
     /// actuators
     pub platform: Option<Platform>,
-}
-
-/// What the platform of a parallel robot does.
-#[derive(Debug, Clone)]
-pub struct Platform {
-    /// what its coordinates are
-    pub task: Task,
-    /// their names
-    pub names: Vec<String>,
-    /// what the series of the trajectory move
-    pub space: Space,
-    /// one period at [`RATE`], the end point left out
-    pub motion: Samples,
-    /// workspace box, actuators, passive joints, singularities and distances
-    pub certificate: ClosedCertificate,
-    /// uses of the limits of the pose at the samples
-    pub uses: Vec<Vec<PoseUse>>,
-    /// smallest singular values at the samples: of the actuation Jacobian, of the constraint block
-    pub sigma: Vec<[Option<f64>; 2]>,
-    /// the mechanism in home and in its extreme poses: what, when, and its lines
-    pub poses: Vec<(String, Vec<Segment>)>,
 }
 
 /// The report before the run, of a robot alone or with a trajectory.
@@ -131,153 +101,90 @@ pub struct Assessment {
     pub warnings: Vec<Warning>,
 }
 
-/// Torque noise per joint and a warning for those that had to be assumed.
-pub fn torque_noise(robot: &Robot) -> (Vec<f64>, Vec<Warning>) {
-    let mut missing = Vec::new();
-    let noise = robot
-        .joints
-        .iter()
-        .map(|j| {
-            j.torque_noise.unwrap_or_else(|| {
-                missing.push(j.name.as_str());
-                let effort = j.limits.effort;
-                DEFAULT_NOISE * if effort.is_finite() { effort } else { 100.0 }
-            })
-        })
-        .collect();
-    let warnings = if missing.is_empty() {
-        vec![]
-    } else {
-        vec![Warning::new(
-            WarningKind::TorqueNoiseAssumed,
-            "torque_noise",
-            format!(
-                "not stated for {}: taken as {} % of the effort limit; state `torque_noise` for \
-                 predictions that can be trusted",
-                missing.join(", "),
-                100.0 * DEFAULT_NOISE
-            ),
-        )]
+/// What a robot can tell at all, or on this trajectory.
+///
+/// # Errors
+/// As [`BaseParameters::new`]; a trajectory of another robot, or one that leaves the reach of a closed
+/// chain.
+pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessment> {
+    let Some(trajectory) = trajectory else {
+        return alone(plant);
     };
-    (noise, warnings)
+    let plant = &plant.clone().in_space(trajectory.space)?;
+    let mut all = alone(plant)?;
+    all.warnings.extend(trajectory.matches(plant.moved())?);
+    let motion = sample_period(&trajectory.fourier);
+    let w = plant.regressor(&motion)?;
+    let (condition, singular_values, log_det) =
+        condition_numbers(&all.base, w.as_ref(), &all.torque_noise)?;
+    let kept = all.base.select(w.as_ref());
+    let predictions = predict(
+        &all.values,
+        &all.base,
+        weighted(kept.as_ref(), &all.torque_noise).as_ref(),
+        f64::from(trajectory.periods),
+    );
+    let certified = plant.certify(&trajectory.fourier, 1.0)?;
+    if certified.proof == Proof::Stated {
+        all.warnings.push(Warning::new(
+            WarningKind::BoundedNotProven,
+            "limits",
+            "this mechanism has no closed-form kinematics: what its actuators do between the \
+             samples is bounded by twice the largest second difference, not proven",
+        ));
+    }
+    let platform = match (plant.mechanism(), certified.mechanism) {
+        (Some(m), Some(c)) => Some(Platform::of(m, &motion, c)?),
+        _ => None,
+    };
+    all.warnings
+        .extend(unexcited(&condition, platform.is_some()));
+    all.excitation = Some(Excitation {
+        samples: motion.count * trajectory.periods as usize,
+        trajectory: trajectory.clone(),
+        torque: plant.nominal_torque(&motion)?,
+        condition,
+        log_det,
+        singular_values,
+        predictions,
+        certificate: certified.actuators,
+        platform,
+        motion: plant.actuator_motion(&motion)?,
+    });
+    Ok(all)
 }
 
-impl Assessment {
-    /// What a robot can tell at all.
-    ///
-    /// # Errors
-    /// As [`BaseParameters::new`].
-    pub fn of_robot(robot: &Robot) -> Result<Self> {
-        let base = BaseParameters::new(robot)?;
-        Ok(Self::alone(robot.clone(), base, robot.parameters(), false))
-    }
-
-    /// What a robot of either kind can tell at all.
-    ///
-    /// # Errors
-    /// As [`BaseParameters::new`].
-    pub fn of_plant(plant: &Plant) -> Result<Self> {
-        let mechanism = match plant {
-            Plant::Serial(robot) => return Self::of_robot(robot),
-            Plant::Parallel(mechanism) => mechanism,
-        };
-        let robot = mechanism.actuator_robot();
-        Ok(Self::alone(robot, plant.base()?, plant.values(), true))
-    }
-
-    /// Without a trajectory.
-    fn alone(robot: Robot, base: BaseParameters, values: Vec<f64>, mechanism: bool) -> Self {
-        let (torque_noise, more) = torque_noise(&robot);
-        let known = robot.warnings.iter().chain(&base.warnings).cloned();
-        Assessment {
-            warnings: known.chain(more).collect(),
-            values,
-            mechanism,
-            robot,
-            base,
-            torque_noise,
-            excitation: None,
-        }
-    }
-
-    /// What a robot of either kind will tell on this trajectory.
-    ///
-    /// # Errors
-    /// As [`Assessment::new`]; for a parallel robot also when the motion leaves its reach, or its
-    /// coordinates are none of the robot's.
-    pub fn with_plant(plant: &Plant, trajectory: &Trajectory) -> Result<Self> {
-        let plant = plant.clone().in_space(trajectory.space)?;
-        match &plant {
-            Plant::Serial(robot) => Self::new(robot, trajectory),
-            Plant::Parallel(mechanism) => closed::assess(&plant, mechanism, trajectory),
-        }
-    }
-
-    /// What a robot will tell on this trajectory.
-    ///
-    /// # Errors
-    /// When the trajectory is of another robot, or as [`BaseParameters::new`].
-    pub fn new(robot: &Robot, trajectory: &Trajectory) -> Result<Self> {
-        let mut all = Self::of_robot(robot)?;
-        all.warnings.extend(trajectory.matches(robot)?);
-        let tree = Tree::new(robot);
-        let motion = sample_period(&trajectory.fourier);
-        let torque = nominal_torque(robot, &tree, &motion);
-        let w = Regressor::with_tree(robot, &tree, &motion);
-        let certificate = certificate(robot, &tree, &trajectory.fourier)?;
-        all.excite(trajectory, motion, torque, w.mat(), certificate, None)?;
-        Ok(all)
-    }
-
-    /// Adds what a motion tells, `w` being its stacked regressor.
-    fn excite(
-        &mut self,
-        trajectory: &Trajectory,
-        motion: Samples,
-        torque: Vec<f64>,
-        w: MatRef<'_, f64>,
-        certificate: Certificate,
-        platform: Option<Platform>,
-    ) -> Result<()> {
-        let (condition, singular_values, log_det) =
-            condition_numbers(&self.base, w, &self.torque_noise)?;
-        let kept = self.base.select(w);
-        let predictions = predict(
-            &self.values,
-            &self.base,
-            weighted(kept.as_ref(), &self.torque_noise).as_ref(),
-            f64::from(trajectory.periods),
-        );
-        if condition.invariant > 1e7 && platform.is_none() {
-            self.warnings.push(Warning::new(
-                WarningKind::NotExcited,
-                "trajectory",
-                format!(
-                    "it does not excite every base parameter: the condition number is {:.1e}",
-                    condition.invariant
-                ),
-            ));
-        }
-        self.excitation = Some(Excitation {
-            samples: motion.count * trajectory.periods as usize,
-            trajectory: trajectory.clone(),
-            motion,
-            torque,
-            condition,
-            log_det,
-            singular_values,
-            predictions,
-            certificate,
-            platform,
-        });
-        Ok(())
-    }
+/// Without a trajectory.
+fn alone(plant: &Plant) -> Result<Assessment> {
+    let base = plant.base()?;
+    let (torque_noise, more) = plant.torque_noise();
+    let known = plant.warnings().iter().chain(&base.warnings).cloned();
+    Ok(Assessment {
+        warnings: known.chain(more).collect(),
+        values: plant.values(),
+        mechanism: plant.mechanism().is_some(),
+        robot: plant.actuator_robot(),
+        base,
+        torque_noise,
+        excitation: None,
+    })
 }
 
-/// One period at [`RATE`] (at least 20 samples), the end point left out.
-pub fn sample_period(fourier: &Fourier) -> Samples {
-    let count = ((fourier.period * RATE).round() as usize).clamp(20, 1_000_000);
-    fourier.motion(count)
+/// A warning where the motion leaves base parameters out. Parameters of a closed chain differ by many
+/// orders of magnitude in size, so unit columns decide there.
+fn unexcited(condition: &ConditionNumbers, platform: bool) -> Option<Warning> {
+    let (number, most, how) = match platform {
+        false => (condition.invariant, 1e7, ""),
+        true => (condition.normalised, 1e6, " with unit columns"),
+    };
+    (number > most).then(|| {
+        let message = "it does not excite every base parameter: the condition number";
+        Warning::new(
+            WarningKind::NotExcited,
+            "trajectory",
+            format!("{message}{how} is {number:.1e}"),
+        )
+    })
 }
 
 /// Condition numbers, non-zero singular values and `ln det` of the weighted information matrix.
@@ -366,29 +273,4 @@ fn predict(
         key(y).total_cmp(&key(x))
     });
     all
-}
-
-/// Proof that the limits hold for all time, torques included.
-///
-/// # Errors
-/// When trajectory and robot differ in their joints.
-pub fn certificate(robot: &Robot, tree: &Tree, fourier: &Fourier) -> Result<Certificate> {
-    let positions = certify(robot, fourier)?;
-    let phi: Vec<f64> = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
-    let n = robot.dof();
-    let workspace =
-        std::cell::RefCell::new((crate::dynamics::Workspace::default(), Samples::zeros(n, 1)));
-    let torque = |q: &[f64], qd: &[f64], qdd: &[f64], tau: &mut [f64]| {
-        let (ws, s) = &mut *workspace.borrow_mut();
-        s.q.copy_from_slice(q);
-        s.qd.copy_from_slice(qd);
-        s.qdd.copy_from_slice(qdd);
-        tree.inverse_dynamics(ws, &phi, s, tau);
-        for (j, joint) in robot.joints.iter().enumerate() {
-            let [armature, viscous, _, offset] = joint.terms;
-            tau[j] += armature * qdd[j] + viscous * qd[j] + offset;
-        }
-    };
-    let bounds = torque_certificate(robot, fourier, 2000, &torque)?;
-    Ok(positions.with_torque(bounds))
 }

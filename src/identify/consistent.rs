@@ -21,7 +21,7 @@
 //! program where the distance is quadratic.
 
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::plant::Plant;
+use crate::plant::{Column, Plant};
 use crate::robot::{Inertia, JointTerm};
 use faer::{Mat, MatRef, Side};
 use nalgebra::Matrix4;
@@ -135,7 +135,7 @@ impl Prior {
             });
         }
         for (u, p) in parameters.iter().enumerate().filter(|(u, _)| !taken[*u]) {
-            let crate::plant::Kind::Term { term, joint } = p.kind else {
+            let Column::Term { term, joint } = p.kind else {
                 prior.free.push((u, p.value, 1.0 + p.value.abs()));
                 continue;
             };
@@ -244,24 +244,32 @@ impl Prior {
 /// For every body with unknowns of its own, which unknown each of its ten parameters is. Bodies that
 /// share all of theirs with an earlier one are left out.
 pub fn body_unknowns(plant: &Plant) -> Vec<(usize, [Option<usize>; 10])> {
-    let mut out: Vec<(usize, [Option<usize>; 10])> = Vec::new();
-    match plant {
-        Plant::Serial(robot) => {
-            for b in 0..robot.bodies.len() {
-                out.push((b, std::array::from_fn(|k| Some(10 * b + k))));
-            }
+    // which unknown multiplies each raw column first
+    let mut first = vec![None; plant.raw().len()];
+    for (u, p) in plant.parameters().iter().enumerate() {
+        for &r in &p.raw {
+            first[r].get_or_insert(u);
         }
-        Plant::Parallel(m) => {
-            let list = &m.parameters;
-            for (i, &b) in list.bodies.iter().enumerate() {
-                let of = |k: usize| list.list.iter().position(|p| p.raw.contains(&(10 * i + k)));
-                let map: [Option<usize>; 10] = std::array::from_fn(of);
-                if map.iter().any(Option::is_some) && !out.iter().any(|(_, o)| *o == map) {
-                    out.push((b, map));
-                }
+    }
+    let mut out: Vec<(usize, [Option<usize>; 10])> = Vec::new();
+    for (column, unknown) in plant.raw().iter().zip(first) {
+        if let Column::Inertial { body, k } = *column {
+            if out.last().is_none_or(|(b, _)| *b != body) {
+                out.push((body, [None; 10]));
+            }
+            if let Some((_, map)) = out.last_mut() {
+                map[k] = unknown;
             }
         }
     }
+    let mut seen: Vec<[Option<usize>; 10]> = Vec::new();
+    out.retain(|(_, map)| {
+        let new = map.iter().any(Option::is_some) && !seen.contains(map);
+        if new {
+            seen.push(*map);
+        }
+        new
+    });
     out
 }
 

@@ -4,8 +4,8 @@
 
 use super::robot::{base_name, rpy};
 use crate::error::{Error, Result};
-use crate::mechanism::Mechanism;
-use crate::mechanism::loops::{Coincide, Frame};
+use crate::mechanism::loops::{Closure, Coincide, Frame};
+use crate::mechanism::{Mechanism, Source};
 use crate::robot::{Inertia, JointTerm, Robot};
 use nalgebra::{Matrix3, Vector3};
 use toml::{Table, Value};
@@ -23,16 +23,24 @@ pub fn toml(mechanism: &Mechanism, robot: &Robot, urdf: &str) -> Result<String> 
             robot.name
         ))
     };
-    let mut file: Table = match mechanism.source.is_empty() {
+    let mut file: Table = match mechanism.text.is_empty() {
         true => return Err(none()),
-        false => toml::from_str(&mechanism.source).map_err(|_| none())?,
+        false => toml::from_str(&mechanism.text).map_err(|_| none())?,
     };
     file.insert("name".into(), robot.name.clone().into());
     terms(&mut file, mechanism, robot);
-    match mechanism.kind {
-        "gough-stewart" => legs(&mut file, robot)?,
-        "h4" | "delta" => chains(&mut file, mechanism, robot)?,
-        _ => loops(&mut file, mechanism, robot, urdf)?,
+    match &mechanism.platform().source {
+        Source::GoughStewart => legs(&mut file, robot)?,
+        Source::H4 | Source::Delta => chains(&mut file, mechanism, robot)?,
+        Source::Loops(closures) => loops(&mut file, mechanism, closures, robot, urdf)?,
+        source @ (Source::Code(_) | Source::InActuators(_)) => {
+            return Err(Error::Infeasible(format!(
+                "{}: no robot file can hold a mechanism of kind `{}`, whose kinematics are code; \
+                 write its values into that code",
+                robot.name,
+                source.name()
+            )));
+        }
     }
     let text = toml::to_string(&file).map_err(|e| Error::Infeasible(e.to_string()))?;
     Ok(format!(
@@ -199,7 +207,13 @@ fn lumped_arm(own: &Inertia) -> Inertia {
 }
 
 /// The tree's URDF, and closures and configuration in its terms.
-fn loops(file: &mut Table, mechanism: &Mechanism, robot: &Robot, urdf: &str) -> Result<()> {
+fn loops(
+    file: &mut Table,
+    mechanism: &Mechanism,
+    closures: &[Closure],
+    robot: &Robot,
+    urdf: &str,
+) -> Result<()> {
     for key in ["yaml", "lock", "home"] {
         file.remove(key);
     }
@@ -212,7 +226,7 @@ fn loops(file: &mut Table, mechanism: &Mechanism, robot: &Robot, urdf: &str) -> 
         table.insert("rpy".into(), numbers(&rpy(&f.rotation)));
         Value::Table(table)
     };
-    let closures = mechanism.geometry().closures().iter().map(|c| {
+    let closures = closures.iter().map(|c| {
         let coincide = match c.coincide {
             Coincide::Position => "position",
             Coincide::Pose => "pose",

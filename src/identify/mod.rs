@@ -554,9 +554,7 @@ fn cross_validate(
 
 /// Standard deviations that the stated torque noise promises: white, every recorded sample counted.
 fn predicted(plant: &Plant, fit: &[&Stack]) -> Result<Vec<f64>> {
-    let robot = plant.robot();
-    let (noise, _) = crate::identifiability::torque_noise(robot);
-    let sigma: Vec<f64> = plant.actuated().into_iter().map(|a| noise[a]).collect();
+    let (sigma, _) = plant.torque_noise();
     let parts: Vec<Mat<f64>> = fit
         .par_iter()
         .map(|s| {

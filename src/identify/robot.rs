@@ -1,8 +1,7 @@
 //! The identified robot as files: URDF, MuJoCo's XML, and a `robot.toml` beside them.
 
-use super::consistent::body_unknowns;
-use crate::plant::{Kind, Plant};
-use crate::robot::{Body, Inertia, JointTerm, Motion, Robot};
+use crate::plant::{Column, Plant};
+use crate::robot::{Body, JointTerm, Motion, Robot};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::fmt::Write;
 
@@ -14,28 +13,15 @@ pub fn with_values(plant: &Plant, phi: &[f64]) -> Robot {
     let mut robot = plant.robot().clone();
     let parameters = plant.parameters();
     assert_eq!(parameters.len(), phi.len(), "one number for each unknown");
-    match plant {
-        Plant::Serial(_) => {
-            for (body, map) in body_unknowns(plant) {
-                let ten = std::array::from_fn(|k| map[k].map_or(0.0, |u| phi[u]));
-                robot.bodies[body].inertia = Inertia(ten);
-            }
-            for (p, x) in parameters.iter().zip(phi) {
-                if let Kind::Term { joint, term } = p.kind {
-                    robot.joints[joint].terms[term as usize] = *x;
-                }
-            }
-        }
-        Plant::Parallel(m) => {
-            let raw = m.parameters.expand(phi);
-            for (i, &b) in m.parameters.bodies.iter().enumerate() {
-                let ten = std::array::from_fn(|k| raw[10 * i + k]);
-                robot.bodies[b].inertia = Inertia(ten);
-            }
-            let first = 10 * m.parameters.bodies.len();
-            for (i, &(joint, term)) in m.parameters.terms.iter().enumerate() {
-                robot.joints[joint].terms[term as usize] = raw[first + i];
-            }
+    let mut raw = vec![0.0; plant.raw().len()];
+    for (p, x) in parameters.iter().zip(phi) {
+        p.raw.iter().for_each(|&r| raw[r] += x);
+    }
+    for (column, x) in plant.raw().iter().zip(raw) {
+        match *column {
+            Column::Inertial { body, k } => robot.bodies[body].inertia.0[k] = x,
+            Column::Term { joint, term } => robot.joints[joint].terms[term as usize] = x,
+            Column::Nuisance => {}
         }
     }
     robot

@@ -214,7 +214,7 @@ pub fn from_records(
     mut records: Vec<Loaded>,
     settings: &Settings,
 ) -> Result<Identified> {
-    let Some(tool) = crate::simulate::effects::tool_body(plant) else {
+    let Some(tool) = plant.tool() else {
         return Err(Error::Infeasible(format!(
             "{} has no body that could carry a load",
             plant.name()
@@ -265,10 +265,7 @@ pub fn from_records(
     };
     Ok(Identified {
         robot: plant.name().into(),
-        frame: match plant.mechanism() {
-            Some(_) => "platform".into(),
-            None => plant.robot().bodies[tool].name.clone(),
-        },
+        frame: plant.robot().bodies[tool].name.clone(),
         one_step,
         two_step,
         no_two_step,

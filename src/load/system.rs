@@ -3,11 +3,11 @@
 
 use super::Loaded;
 use crate::base::BaseParameters;
-use crate::dynamics::{Samples, Tree, Workspace};
+use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::log::Payload;
 use crate::plant::Plant;
-use crate::regressor::{Regressor, term_factor};
+use crate::regressor::term_factor;
 use crate::robot::{Column, JointTerm};
 use crate::signals::Decimator;
 use faer::Mat;
@@ -75,64 +75,25 @@ pub struct System {
     pub deviations: Vec<String>,
 }
 
-/// Regressor columns of the tool for a motion, `actuators·count × 10`.
-pub fn tool_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<Mat<f64>> {
-    let count = x.count;
-    match plant {
-        Plant::Serial(robot) => {
-            let w = Regressor::new(robot, x);
-            let w = w.mat();
-            Ok(Mat::from_fn(w.nrows(), 10, |r, k| w[(r, 10 * tool + k)]))
-        }
-        Plant::Parallel(mechanism) => {
-            let motion = mechanism.motion(x)?;
-            let na = mechanism.actuators();
-            let rows = na * count;
-            let mut w = vec![0.0; rows * 10];
-            let tree: &Tree = mechanism.tree();
-            tree.projected_regressor(
-                &mut Workspace::default(),
-                &[tool],
-                &motion.tree,
-                &motion.g,
-                na,
-                &mut w,
-                rows,
-                count,
-            );
-            Ok(Mat::from_fn(rows, 10, |r, k| w[k * rows + r]))
-        }
-    }
-}
-
 /// Columns of what may deviate in the empty robot: all bodies and armatures of a serial robot, the
 /// platform of a parallel one.
 fn deviation_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<(Mat<f64>, Vec<String>)> {
-    match plant {
-        Plant::Serial(robot) => {
-            let columns = robot.columns();
-            let wanted: Vec<usize> = (0..columns.len())
-                .filter(|&c| match columns[c] {
-                    Column::Inertial { .. } => true,
-                    Column::Term { term, .. } => term == JointTerm::Armature,
-                })
-                .collect();
-            let names = wanted
-                .iter()
-                .map(|&c| robot.column_name(columns[c]))
-                .collect();
-            let w = Regressor::new(robot, x);
-            let w = w.mat();
-            Ok((
-                Mat::from_fn(w.nrows(), wanted.len(), |r, c| w[(r, wanted[c])]),
-                names,
-            ))
-        }
-        Plant::Parallel(_) => {
-            let names = crate::robot::inertia::NAMES.map(|n| format!("platform.{n}"));
-            Ok((tool_columns(plant, tool, x)?, names.to_vec()))
-        }
+    if plant.mechanism().is_some() {
+        let names = crate::robot::inertia::NAMES.map(|n| format!("platform.{n}"));
+        return Ok((plant.body_columns(tool, x)?, names.to_vec()));
     }
+    let parameters = plant.parameters();
+    let wanted: Vec<usize> = (0..parameters.len())
+        .filter(|&c| match parameters[c].kind {
+            Column::Inertial { .. } => true,
+            Column::Term { term, .. } => term == JointTerm::Armature,
+            Column::Nuisance => false,
+        })
+        .collect();
+    let names = wanted.iter().map(|&c| parameters[c].name.clone()).collect();
+    let w = plant.regressor(x)?;
+    let columns = Mat::from_fn(w.nrows(), wanted.len(), |r, c| w[(r, wanted[c])]);
+    Ok((columns, names))
 }
 
 /// Nominal torque without viscous, Coulomb and constant terms of the actuators.
@@ -159,7 +120,7 @@ impl System {
     pub fn new(plant: &Plant, tool: usize, records: &[&Loaded], deviate: bool) -> Result<Self> {
         let states = plant.random_states(400, 0x10ad);
         let names = crate::robot::inertia::NAMES.map(|n| format!("load.{n}"));
-        let over = tool_columns(plant, tool, &states)?;
+        let over = plant.body_columns(tool, &states)?;
         let base = BaseParameters::from_matrix(names.to_vec(), units(), over.as_ref())?;
         let (kept, deviations) = match deviate {
             false => (Vec::new(), Vec::new()),
@@ -199,7 +160,7 @@ fn part(plant: &Plant, tool: usize, loaded: &Loaded, kept: &[usize]) -> Result<P
             .collect();
         Mat::from_fn(na * count, w.ncols(), |r, c| columns[c][r])
     };
-    let tool_full = tool_columns(plant, tool, x)?;
+    let tool_full = plant.body_columns(tool, x)?;
     let deviation = match kept.is_empty() {
         true => Mat::zeros(na * count, 0),
         false => {

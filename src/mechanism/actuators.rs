@@ -14,12 +14,12 @@
 //! all exact, so that a Fourier series of the actuators is designed, judged and simulated as one of
 //! the platform is.
 
+use super::follow::{forward, rates};
 use super::geometry::{Cone, Geometry, Segment};
-use super::{ClosedMotion, Mechanism, Task};
+use super::{Mechanism, MechanismMotion, Source, Task};
 use crate::dynamics::{Isa, Samples};
 use crate::error::{Error, Result};
 use crate::robot::Limits;
-use crate::signals::platform::{forward, rates};
 use crate::trajectory::Space;
 use nalgebra::DMatrix;
 use std::borrow::Cow;
@@ -48,7 +48,15 @@ impl Mechanism {
     /// The mechanism in the coordinates of its platform, where it has been put
     /// [`in_actuators`](Mechanism::in_actuators); otherwise itself.
     pub fn platform(&self) -> &Mechanism {
-        self.geometry.platform().unwrap_or(self)
+        self.follows().unwrap_or(self)
+    }
+
+    /// The mechanism in the coordinates of its platform, where that follows from the actuators.
+    pub(crate) fn follows(&self) -> Option<&Mechanism> {
+        match &self.source {
+            Source::InActuators(platform) => Some(platform),
+            _ => None,
+        }
     }
 
     /// The same mechanism with the positions of its actuators as task coordinates, inside their own
@@ -79,6 +87,7 @@ impl Mechanism {
         }
         let limits = |&a: &usize| -> Limits { self.robot.joints[a].limits };
         Ok(Mechanism {
+            source: Source::InActuators(Box::new(self.clone())),
             task: Task::Joints(m),
             task_names: self.actuator_names(),
             workspace: self.actuated.iter().map(limits).collect(),
@@ -106,7 +115,7 @@ impl Mechanism {
     /// # Errors
     /// As [`Mechanism::motion`].
     pub fn platform_motion<'a>(&self, x: &'a Samples) -> Result<Cow<'a, Samples>> {
-        match self.geometry.platform() {
+        match self.follows() {
             Some(_) => Ok(self.platform_of(x, &self.motion(x)?.tree)),
             None => Ok(Cow::Borrowed(x)),
         }
@@ -114,7 +123,7 @@ impl Mechanism {
 
     /// [`Mechanism::platform_motion`] where the motion of the tree is at hand.
     pub(super) fn platform_of<'a>(&self, x: &'a Samples, tree: &Samples) -> Cow<'a, Samples> {
-        match self.geometry.platform() {
+        match self.follows() {
             Some(_) => Cow::Owned(tree.rows(&self.platform_rows())),
             None => Cow::Borrowed(x),
         }
@@ -157,7 +166,7 @@ impl ActuatorSpace {
     }
 
     /// Motion of the platform and of the tree.
-    fn follow(&self, isa: Isa, theta: &Samples) -> Result<(Samples, ClosedMotion)> {
+    fn follow(&self, isa: Isa, theta: &Samples) -> Result<(Samples, MechanismMotion)> {
         let (m, count) = (theta.dof, theta.count);
         let mut x = Samples::zeros(m, count);
         x.q = self.poses(theta)?;
@@ -166,7 +175,7 @@ impl ActuatorSpace {
         let rates = rates(&self.platform, &positions, &first, Some(&second))?;
         x.qd = rates.velocity.concat();
         x.qdd = rates.acceleration.unwrap_or_default().concat();
-        let mut motion = ClosedMotion::default();
+        let mut motion = MechanismMotion::default();
         self.platform.motion_into(isa, &x, &mut motion)?;
         Ok((x, motion))
     }
@@ -196,9 +205,6 @@ impl Geometry for ActuatorSpace {
     }
     fn task_joints(&self) -> Option<&[usize]> {
         Some(&self.platform.actuated)
-    }
-    fn platform(&self) -> Option<&Mechanism> {
-        Some(&self.platform)
     }
     fn sequential(&self) -> bool {
         true

@@ -1,6 +1,6 @@
 //! Proof that a platform motion keeps the limits of a closed chain at all times.
 //!
-//! The platform's own box holds by the exact extrema of its series ([`certify`]). What the
+//! The platform's own box holds by the exact extrema of its series ([`trajectory::certify`](crate::trajectory::certify)). What the
 //! actuators do is no trigonometric polynomial. Over a stretch `[c − r, c + r]` of time
 //!
 //! ```text
@@ -25,15 +25,17 @@
 //! other way round: the actuators are exact, by the extrema of their series as for a serial robot,
 //! and the box of a platform that follows is sampled with the stated bound.
 
-use super::dynamics::slice;
 use super::geometry::Path;
 use super::interval::Interval;
 use super::margins::PoseKind;
-use super::{ClosedWorkspace, Mechanism};
+use super::motion::slice;
+use super::{Mechanism, MechanismWorkspace};
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::robot::{Limits, Robot};
-use crate::trajectory::certificate::{Certificate, JointCertificate, Peak, Range, TOLERANCE};
+use crate::trajectory::certificate::{
+    Certificate, JointCertificate, Peak, Proof, Range, TOLERANCE,
+};
 use crate::trajectory::{Extremum, Fourier, TorqueBound, certify};
 
 /// Samples of a period for what is sampled, and the fewest stretches.
@@ -45,7 +47,7 @@ const MISSING: f64 = 1e-3;
 
 /// What is known of the limits of a closed chain.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ClosedCertificate {
+pub struct MechanismCertificate {
     /// the workspace box, coordinates of the platform as joints: exact where the series are theirs,
     /// else sampled with a stated bound
     pub platform: Certificate,
@@ -53,11 +55,18 @@ pub struct ClosedCertificate {
     pub actuators: Certificate,
     /// passive joints, singularities, distances
     pub pose: Vec<PosePeak>,
-    /// whether the kinematic limits of the actuators are proven (series of the actuators, or
-    /// closed-form kinematics)
-    pub proven: bool,
+    /// how the kinematic limits of the actuators are known between the samples
+    pub proof: Proof,
     /// whether every limit holds
     pub satisfied: bool,
+}
+
+impl MechanismCertificate {
+    /// Whether the kinematic limits of the actuators are proven: by series of the actuators or by a
+    /// closed form of the kinematics.
+    pub fn proven(&self) -> bool {
+        self.proof != Proof::Stated
+    }
 }
 
 /// The worst of one limit of the pose over all time.
@@ -234,34 +243,28 @@ fn missing(u: &[f64]) -> f64 {
     (0..n).map(bend).fold(0.0, f64::max) / 4.0
 }
 
-/// Judges a motion of the task coordinates against the workspace box and all limits of the
-/// actuators times `derate` (positions keep the middle of their range), and against passive joints,
-/// singularities and distances.
-///
-/// # Errors
-/// A trajectory of another mechanism, or one that leaves the reach.
-pub fn closed_certificate(
-    mechanism: &Mechanism,
-    fourier: &Fourier,
-    derate: f64,
-) -> Result<ClosedCertificate> {
+impl Mechanism {
+    /// Judges a motion of the task coordinates against the workspace box and all limits of the
+    /// actuators times `derate` (positions keep the middle of their range), and against passive joints,
+    /// singularities and distances.
+    ///
+    /// # Errors
+    /// A trajectory of another mechanism, or one that leaves the reach.
+    pub fn certify(&self, fourier: &Fourier, derate: f64) -> Result<MechanismCertificate> {
+        judge(self, fourier, derate)
+    }
+}
+
+/// [`Mechanism::certify`].
+fn judge(mechanism: &Mechanism, fourier: &Fourier, derate: f64) -> Result<MechanismCertificate> {
     let mut actuators = mechanism.actuator_robot();
     for joint in &mut actuators.joints {
-        let l = &mut joint.limits;
-        let [low, high] = l.position;
-        if low.is_finite() && high.is_finite() {
-            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * derate);
-            l.position = [middle - half, middle + half];
-        }
-        l.velocity *= derate;
-        l.acceleration *= derate;
-        l.jerk *= derate;
-        l.effort *= derate;
+        joint.limits = joint.limits.derated(derate);
     }
     let samples = fourier.motion(SAMPLES);
     let platform = platform_certificate(mechanism, fourier, &samples)?;
-    let (kinematic, proven) = actuator_certificates(mechanism, fourier, &actuators, &samples)?;
-    let mut ws = ClosedWorkspace::default();
+    let (kinematic, proof) = actuator_certificates(mechanism, fourier, &actuators, &samples)?;
+    let mut ws = MechanismWorkspace::default();
     let n = samples.count;
     let na = mechanism.actuators();
     let (mut smooth, mut friction) = (vec![0.0; na * n], vec![0.0; na * n]);
@@ -318,11 +321,11 @@ pub fn closed_certificate(
     let poses = mechanism.platform_motion(&samples)?;
     let pose = pose_peaks(mechanism.platform(), &poses, step, derate);
     let satisfied = platform.satisfied && actuators.satisfied && pose.iter().all(|p| p.satisfied);
-    Ok(ClosedCertificate {
+    Ok(MechanismCertificate {
         platform,
         actuators,
         pose,
-        proven,
+        proof,
         satisfied,
     })
 }
@@ -334,7 +337,7 @@ fn platform_certificate(
     fourier: &Fourier,
     samples: &Samples,
 ) -> Result<Certificate> {
-    if mechanism.geometry().platform().is_none() {
+    if mechanism.follows().is_none() {
         return certify(&mechanism.task_robot(), fourier);
     }
     let reach = sampled_reach(&*mechanism.platform_motion(samples)?, fourier.period);
@@ -353,16 +356,19 @@ fn actuator_certificates(
     fourier: &Fourier,
     actuators: &Robot,
     samples: &Samples,
-) -> Result<(Vec<JointCertificate>, bool)> {
+) -> Result<(Vec<JointCertificate>, Proof)> {
     let given: Vec<Option<usize>> = (mechanism.actuated.iter())
         .map(|a| mechanism.task_joints().iter().position(|j| j == a))
         .collect();
-    let (mut all, mut proven) = (Vec::new(), true);
+    let (mut all, mut proof) = (Vec::new(), Proof::Exact);
     if given.contains(&None) {
         let (reach, enclosed) = actuator_reach(mechanism, fourier, actuators, samples)?;
         let each = reach.iter().zip(&actuators.joints);
         all.extend(each.map(|(r, joint)| r.certificate(&joint.name, &joint.limits)));
-        proven = enclosed;
+        proof = match enclosed {
+            true => Proof::Enclosed,
+            false => Proof::Stated,
+        };
     }
     let mut moved = mechanism.task_robot();
     for (joint, k) in actuators.joints.iter().zip(&given) {
@@ -378,7 +384,7 @@ fn actuator_certificates(
             (None, _) => {}
         }
     }
-    Ok((all, proven))
+    Ok((all, proof))
 }
 
 /// What the actuators reach: proven where the kinematics has a closed form, else sampled with the

@@ -2,10 +2,10 @@
 //! (Clavel 1988). Every rod is a body: 10 bodies, 100 columns. See
 //! [`parallelogram`] for the chain.
 
-use super::geometry::{Closed, Kinematics};
+use super::geometry::{ClosedForm, Kinematics};
 use super::parallelogram::{self, Bodies, Chain, Parallelograms};
 use super::task::Task;
-use super::{Mechanism, Setup};
+use super::{Mechanism, Setup, Source};
 use crate::error::{Error, Result};
 use crate::robot::{Inertia, JointTerm};
 use nalgebra::Vector3;
@@ -72,11 +72,11 @@ impl Delta {
             .map(|c| c.arm_length)
             .fold(0.0, f64::max);
         Ok(Setup {
-            kind: "delta",
+            source: Source::Delta,
             robot: tree.robot(&self.name, self.gravity),
             actuated: (0..3).collect(),
             task: Task::Translation,
-            geometry: Box::new(Closed::<_, 3>(kinematics)),
+            geometry: Box::new(ClosedForm::<_, 3>(kinematics)),
             groups: parallelogram::groups(&parts, self.bodies, self.identical),
             home: self.home.to_vec(),
             length,

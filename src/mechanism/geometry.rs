@@ -2,7 +2,7 @@
 //!
 //! The author of a closed-form mechanism writes [`Kinematics`]: the inverse kinematics of
 //! *positions*, from the task coordinates `x` to all tree coordinates `q = F(x)`, generic over
-//! [`Scalar`]. [`Closed`] turns that into a [`Geometry`]: motions, Jacobians and curvatures of
+//! [`Scalar`]. [`ClosedForm`] turns that into a [`Geometry`]: motions, Jacobians and curvatures of
 //! batches, exact and in packs of samples. Mechanisms without closed form
 //! implement [`Geometry`] themselves.
 //!
@@ -12,8 +12,6 @@
 //! q = F(x)     q̇ = D ẋ     q̈ = D ẍ + F_xx[ẋ, ẋ]
 //! ```
 
-use super::Mechanism;
-use super::loops::Closure;
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
 #[cfg(all(target_arch = "x86_64", feature = "wide"))]
@@ -131,17 +129,6 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
         None
     }
 
-    /// The mechanism in the coordinates of its platform, where the task coordinates are its
-    /// actuators in their place, see [`Mechanism::in_actuators`].
-    fn platform(&self) -> Option<&Mechanism> {
-        None
-    }
-
-    /// The closures, where the mechanism is a tree with loops.
-    fn closures(&self) -> &[Closure] {
-        &[]
-    }
-
     /// Whether each sample starts from the solution of the one before, so that a batch must not be
     /// cut into pieces.
     fn sequential(&self) -> bool {
@@ -151,7 +138,7 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
 
 /// [`Kinematics`] with `M` task coordinates as a [`Geometry`].
 #[derive(Debug, Clone)]
-pub struct Closed<K, const M: usize>(pub K);
+pub struct ClosedForm<K, const M: usize>(pub K);
 
 /// A loop body over packs of samples.
 pub(crate) trait Pass {
@@ -417,7 +404,7 @@ impl<K: Kinematics, const M: usize> Pass for CurvaturePass<'_, K, M> {
     }
 }
 
-impl<K: Kinematics, const M: usize> Geometry for Closed<K, M> {
+impl<K: Kinematics, const M: usize> Geometry for ClosedForm<K, M> {
     fn coordinates(&self) -> usize {
         self.0.coordinates()
     }

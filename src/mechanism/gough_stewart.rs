@@ -18,12 +18,12 @@
 //!
 //! Khalil & Guégan, IEEE Transactions on Robotics 20(4), 2004, give the same model in closed form.
 
-use super::geometry::{Closed, Cone, Coordinates, Kinematics, Segment};
+use super::geometry::{ClosedForm, Cone, Coordinates, Kinematics, Segment};
 use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
 use super::task::{Task, rotation};
 use super::tree::{Builder, Place};
-use super::{Mechanism, Setup};
+use super::{Mechanism, Setup, Source};
 use crate::error::{Error, Result};
 use crate::robot::{Inertia, JointTerm, Limits, Motion};
 use nalgebra::{Matrix3, Vector3};
@@ -218,11 +218,11 @@ impl GoughStewart {
             return Err(Error::Infeasible(format!("at home {why}")));
         }
         Ok(Setup {
-            kind: "gough-stewart",
+            source: Source::GoughStewart,
             robot: tree.robot(&self.name, self.gravity),
             actuated: (0..6).collect(),
             task: Task::Pose,
-            geometry: Box::new(Closed::<_, 6>(kinematics)),
+            geometry: Box::new(ClosedForm::<_, 6>(kinematics)),
             groups,
             home: self.home.to_vec(),
             length,

@@ -16,11 +16,11 @@
 //! the weight of the arms, `g cos q`, 18. In the tree these are `Ixx` (and `mz`) of the arms, `m`
 //! and `Izz` of the platform.
 
-use super::geometry::{Closed, Kinematics};
+use super::geometry::{ClosedForm, Kinematics};
 use super::parallelogram::{self, Bodies, Chain, Parallelograms};
 use super::parameters::{Group, Pattern};
 use super::task::Task;
-use super::{Mechanism, Setup};
+use super::{Mechanism, Setup, Source};
 use crate::error::{Error, Result};
 use crate::robot::{Inertia, JointTerm};
 use nalgebra::Vector3;
@@ -184,11 +184,11 @@ impl H4 {
         }
         let length = self.hinges.iter().map(|h| h.norm()).fold(1e-3, f64::max);
         Ok(Setup {
-            kind: "h4",
+            source: Source::H4,
             robot,
             actuated: (0..4).collect(),
             task: Task::Schoenflies,
-            geometry: Box::new(Closed::<_, 4>(kinematics)),
+            geometry: Box::new(ClosedForm::<_, 4>(kinematics)),
             groups,
             home: self.home.to_vec(),
             length,

@@ -24,7 +24,7 @@ pub mod yaml;
 pub use closure::{Closure, Coincide, Frame};
 
 use super::parameters::{Group, Pattern};
-use super::{Mechanism, Setup, Task};
+use super::{Mechanism, Setup, Source, Task};
 use crate::dynamics::Tree;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Motion, Robot};
@@ -132,9 +132,9 @@ impl Loops {
         let groups = self.groups();
         let x: Vec<f64> = independent.iter().map(|&i| home[i]).collect();
         let length = chain.length;
-        let geometry = newton::Closing::new(chain, independent, home, open);
+        let geometry = newton::LoopGeometry::new(chain, independent, home, open);
         let setup = Setup {
-            kind: "loops",
+            source: Source::Loops(self.closures.clone()),
             robot: self.robot.clone(),
             actuated: self.actuated.clone(),
             task: Task::Joints(m),

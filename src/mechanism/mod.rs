@@ -18,48 +18,86 @@
 // the functions that are compiled for them
 #![allow(clippy::needless_range_loop)]
 
+mod actuation;
 mod actuators;
 pub mod bundled;
 mod certificate;
 pub mod delta;
-mod dynamics;
 pub mod file;
+pub mod follow;
 mod forward;
 pub mod geometry;
 pub mod gough_stewart;
+mod gradients;
 pub mod h4;
 pub mod interval;
 pub mod loops;
 pub mod margins;
+mod motion;
 mod motion_file;
 pub mod parallelogram;
 pub mod parameters;
+mod regressor;
 pub mod scalar;
 mod singularity;
 mod states;
 pub mod task;
+mod torque;
 pub mod tree;
 
-pub use certificate::{ClosedCertificate, PosePeak, closed_certificate};
-pub(crate) use dynamics::rounded_sign;
-pub use dynamics::{ClosedMotion, ClosedWorkspace, TaskDerivatives};
+pub use certificate::{MechanismCertificate, PosePeak};
 pub use forward::Solution;
-pub use geometry::{Closed, Cone, Coordinates, Geometry, Kinematics, Path, Segment};
+pub use geometry::{ClosedForm, Cone, Coordinates, Geometry, Kinematics, Path, Segment};
+pub use gradients::TaskDerivatives;
+pub(crate) use gradients::rounded_sign;
 pub use margins::{Margins, PoseKind, PoseUse};
-pub use parameters::{Group, Parameter, Parameters, Pattern, RawColumn};
+pub use motion::{MechanismMotion, MechanismWorkspace};
+pub use parameters::{Group, Parameters, Pattern};
 pub use singularity::{SINGULAR, Singularity, Spread};
 pub use task::{PlatformMotion, Task};
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
+use loops::Closure;
 use std::sync::Arc;
+
+/// Where a mechanism comes from: what a writer of robot files must know of it.
+#[derive(Debug, Clone)]
+pub enum Source {
+    /// `mechanism = "gough-stewart"`
+    GoughStewart,
+    /// `mechanism = "h4"`
+    H4,
+    /// `mechanism = "delta"`
+    Delta,
+    /// `mechanism = "loops"`: a tree with these closures
+    Loops(Vec<Closure>),
+    /// this mechanism, its actuators in place of its platform ([`Mechanism::in_actuators`])
+    InActuators(Box<Mechanism>),
+    /// kinematics in code, with a name for messages: no file format stands for it
+    Code(String),
+}
+
+impl Source {
+    /// `gough-stewart`, `h4`, `delta`, `loops`, or the name of what was written in code.
+    pub fn name(&self) -> &str {
+        match self {
+            Source::GoughStewart => "gough-stewart",
+            Source::H4 => "h4",
+            Source::Delta => "delta",
+            Source::Loops(_) => "loops",
+            Source::InActuators(platform) => platform.source.name(),
+            Source::Code(name) => name,
+        }
+    }
+}
 
 /// What a mechanism is put together from.
 #[derive(Debug)]
 pub struct Setup {
-    /// `mechanism = …` of the robot file
-    pub kind: &'static str,
+    /// where it comes from
+    pub source: Source,
     /// the tree
     pub robot: Robot,
     /// indices of the actuated coordinates, in the order of the columns of logs
@@ -79,8 +117,8 @@ pub struct Setup {
 /// A closed chain. See the [module](self) documentation.
 #[derive(Debug, Clone)]
 pub struct Mechanism {
-    /// `gough-stewart`, `h4`, `delta`, `loops`
-    pub kind: &'static str,
+    /// where it comes from
+    pub source: Source,
     /// the tree; its joints are all coordinates
     pub robot: Robot,
     /// actuated coordinates
@@ -103,7 +141,7 @@ pub struct Mechanism {
     /// what was imperfect, a home close to a singularity among them
     pub warnings: Vec<Warning>,
     /// text of the robot file it was read from; empty where it was put together in code
-    pub source: String,
+    pub text: String,
     geometry: Arc<dyn Geometry>,
     tree: Tree,
 }
@@ -117,7 +155,7 @@ impl Mechanism {
     /// A singular home and redundant actuators are warnings.
     pub fn new(setup: Setup) -> Result<Self> {
         let Setup {
-            kind,
+            source,
             mut robot,
             actuated,
             task,
@@ -148,6 +186,15 @@ impl Mechanism {
             };
             if actuated[..i].contains(a) {
                 return Err(about(format!("actuator `{}` is listed twice", joint.name)));
+            }
+        }
+        for group in &groups {
+            let known = |b: &usize| *b < robot.bodies.len();
+            if group.bodies.is_empty() || !group.bodies.iter().all(known) {
+                return Err(about(format!(
+                    "the unknowns `{}` must be of bodies of the tree, not of {:?}",
+                    group.name, group.bodies
+                )));
             }
         }
         if actuated.len() < freedoms {
@@ -193,7 +240,7 @@ impl Mechanism {
             .collect();
         let tree = Tree::new(&robot);
         let mut mechanism = Mechanism {
-            kind,
+            source,
             robot,
             actuated,
             task,
@@ -204,7 +251,7 @@ impl Mechanism {
             length,
             margins: Margins::default(),
             warnings,
-            source: String::new(),
+            text: String::new(),
             geometry: Arc::from(geometry),
             tree,
         };

@@ -5,7 +5,7 @@
 //! `E` (raw columns × parameters): `Y = Y_raw E`, `φ_raw = E φ`.
 
 use crate::error::{Warning, WarningKind};
-use crate::robot::{JointTerm, Robot, inertia};
+use crate::robot::{Column, JointTerm, Parameter, Robot, inertia};
 
 /// Which of the ten parameters of a body are unknowns.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,38 +59,6 @@ impl Group {
     }
 }
 
-/// One unknown.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Parameter {
-    /// `rod3.mz`, `leg1.viscous`
-    pub name: String,
-    /// SI unit
-    pub unit: &'static str,
-    /// nominal value
-    pub value: f64,
-    /// raw columns that it multiplies, each once
-    pub raw: Vec<usize>,
-}
-
-/// A raw column: what a [`Parameter`] is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RawColumn {
-    /// inertial parameter `k` of body `body`
-    Inertial {
-        /// index into [`Robot::bodies`]
-        body: usize,
-        /// 0..10
-        k: usize,
-    },
-    /// term of coordinate `joint`, actuated or passive
-    Term {
-        /// index into [`Robot::joints`]
-        joint: usize,
-        /// which
-        term: JointTerm,
-    },
-}
-
 /// All unknowns of a mechanism.
 #[derive(Debug, Clone)]
 pub struct Parameters {
@@ -141,6 +109,10 @@ impl Parameters {
                     name: format!("{}.{}", group.name, inertia::NAMES[part[0]]),
                     unit: inertia::UNITS[part[0]],
                     value,
+                    kind: match group.bodies.first() {
+                        Some(&body) => Column::Inertial { body, k: part[0] },
+                        None => Column::Nuisance,
+                    },
                     raw,
                 });
             }
@@ -189,6 +161,7 @@ impl Parameters {
                         name: format!("{}.{}", joint.name, term.name()),
                         unit: term.unit(joint.motion),
                         value: joint.terms[term as usize],
+                        kind: Column::Term { joint: j, term },
                         raw: vec![bodies + self.terms.len()],
                     });
                     self.terms.push((j, term));
@@ -203,15 +176,15 @@ impl Parameters {
     }
 
     /// Meaning of a raw column.
-    pub fn raw(&self, column: usize) -> Option<RawColumn> {
+    pub fn raw(&self, column: usize) -> Option<Column> {
         match column.checked_sub(10 * self.bodies.len()) {
-            None => Some(RawColumn::Inertial {
+            None => Some(Column::Inertial {
                 body: self.bodies[column / 10],
                 k: column % 10,
             }),
             Some(t) => {
                 let &(joint, term) = self.terms.get(t)?;
-                Some(RawColumn::Term { joint, term })
+                Some(Column::Term { joint, term })
             }
         }
     }

@@ -163,7 +163,7 @@ impl Mechanism {
     /// # Errors
     /// A pose that cannot be reached.
     pub fn singularity(&self, x: &[f64]) -> Result<Singularity> {
-        if let Some(platform) = self.geometry.platform() {
+        if let Some(platform) = self.follows() {
             return platform.singularity(&platform.forward(x, &platform.home)?.x);
         }
         Ok(Singularity {

@@ -5,12 +5,15 @@
 //! exactly one moving joint. A *coordinate* is what the user commands and measures ([`Joint`]);
 //! several bodies may follow one coordinate (URDF `mimic`): `q_body = ratio · q + offset`.
 
+mod assumed;
 pub mod bundled;
 pub mod file;
 pub mod inertia;
+mod parameter;
 pub mod urdf;
 
 pub use inertia::Inertia;
+pub use parameter::{Column, Parameter};
 
 use crate::error::Warning;
 use nalgebra::{Matrix3, Vector3};
@@ -81,6 +84,23 @@ impl Default for Limits {
             jerk: f64::INFINITY,
             effort: f64::INFINITY,
         }
+    }
+}
+
+impl Limits {
+    /// All limits times `factor`; positions keep the middle of their range.
+    pub fn derated(&self, factor: f64) -> Self {
+        let mut l = *self;
+        let [low, high] = l.position;
+        if low.is_finite() && high.is_finite() {
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * factor);
+            l.position = [middle - half, middle + half];
+        }
+        l.velocity *= factor;
+        l.acceleration *= factor;
+        l.jerk *= factor;
+        l.effort *= factor;
+        l
     }
 }
 
@@ -162,6 +182,14 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// The same joint with all limits times `factor`, see [`Limits::derated`].
+    pub fn derated(&self, factor: f64) -> Self {
+        Joint {
+            limits: self.limits.derated(factor),
+            ..self.clone()
+        }
+    }
+
     /// A joint without limits and without terms.
     pub fn new(name: &str, motion: Motion) -> Self {
         Joint {
@@ -211,25 +239,6 @@ pub struct Robot {
     pub hash: String,
 }
 
-/// Meaning of one column of the regressor, i.e. one standard parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Column {
-    /// inertial parameter `k` (see [`inertia::NAMES`]) of body `body`
-    Inertial {
-        /// index into [`Robot::bodies`]
-        body: usize,
-        /// 0..10
-        k: usize,
-    },
-    /// joint term of coordinate `joint`
-    Term {
-        /// index into [`Robot::joints`]
-        joint: usize,
-        /// which
-        term: JointTerm,
-    },
-}
-
 impl Robot {
     /// Number of coordinates `n`.
     pub fn dof(&self) -> usize {
@@ -271,6 +280,7 @@ impl Robot {
             Column::Term { joint, term } => {
                 format!("{}.{}", self.joints[joint].name, term.name())
             }
+            Column::Nuisance => "nuisance".into(),
         }
     }
 
@@ -279,6 +289,7 @@ impl Robot {
         match column {
             Column::Inertial { k, .. } => inertia::UNITS[k],
             Column::Term { joint, term } => term.unit(self.joints[joint].motion),
+            Column::Nuisance => "",
         }
     }
 
@@ -289,6 +300,21 @@ impl Robot {
             .map(|c| match c {
                 Column::Inertial { body, k } => self.bodies[body].inertia.0[k],
                 Column::Term { joint, term } => self.joints[joint].terms[term as usize],
+                Column::Nuisance => 0.0,
+            })
+            .collect()
+    }
+
+    /// The unknowns, in the order of [`Robot::columns`].
+    pub fn unknowns(&self) -> Vec<Parameter> {
+        let all = self.columns().into_iter().zip(self.parameters());
+        all.enumerate()
+            .map(|(c, (kind, value))| Parameter {
+                name: self.column_name(kind),
+                unit: self.column_unit(kind),
+                value,
+                kind,
+                raw: vec![c],
             })
             .collect()
     }

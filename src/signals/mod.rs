@@ -22,13 +22,12 @@
 //! positions are cut off at 2.5 times that at most.
 //!
 //! Of a parallel robot the logged positions are those of its actuators; the coordinates are the pose of
-//! its platform, from forward kinematics sample by sample ([`platform`]).
+//! its platform, from forward kinematics sample by sample ([`Plant::coordinates_of`](crate::Plant::coordinates_of)).
 
 pub mod butterworth;
 pub mod cutoff;
 pub mod decimate;
 pub mod fourier;
-pub mod platform;
 mod prepare;
 
 pub use butterworth::Butterworth;

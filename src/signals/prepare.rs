@@ -1,11 +1,11 @@
 //! From a record to a [`Prepared`] one.
 
 use super::butterworth::{Butterworth, first_derivative, second_derivative};
-use super::{Decimator, Periods, Prepared, Settings, cutoff, fourier, platform};
+use super::{Decimator, Periods, Prepared, Settings, cutoff, fourier};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Record;
-use crate::plant::Plant;
+use crate::plant::{self, Plant};
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -334,38 +334,23 @@ fn measured_rates(
     plant: &Plant,
     settings: &Settings,
     x: &[Vec<f64>],
-) -> Result<Option<platform::Rates>> {
+) -> Result<Option<plant::Rates>> {
     let Some(dq) = record.dq.as_ref().filter(|_| settings.measured_rates) else {
         return Ok(None);
     };
-    let Some(mechanism) = plant.mechanism() else {
-        return Ok(Some(platform::Rates {
-            velocity: dq.clone(),
-            acceleration: record.ddq.clone(),
-        }));
-    };
-    platform::rates(mechanism, x, dq, record.ddq.as_deref()).map(Some)
+    plant.rates_of(x, dq, record.ddq.as_deref()).map(Some)
 }
 
 /// Coordinates over the whole record.
 fn coordinates(record: &Record, plant: &Plant, settings: &Settings) -> Result<Vec<Vec<f64>>> {
-    let Some(mechanism) = plant.mechanism() else {
-        return Ok(record.q.clone());
-    };
-    let flat = match (&record.pose, settings.measured_pose) {
-        (Some(pose), true) => platform::from_pose(mechanism, pose)?,
-        (None, true) => {
-            return Err(Error::Argument(format!(
-                "{} has no pose columns x y z qw qx qy qz",
-                record.path.display()
-            )));
-        }
-        _ => platform::forward(mechanism, &record.q)?,
-    };
-    Ok(flat
-        .chunks_exact(record.len())
-        .map(<[f64]>::to_vec)
-        .collect())
+    match (&record.pose, settings.measured_pose) {
+        (_, false) => plant.coordinates_of(&record.q),
+        (Some(pose), true) => plant.coordinates_of_pose(pose),
+        (None, true) => Err(Error::Argument(format!(
+            "{} has no pose columns x y z qw qx qy qz",
+            record.path.display()
+        ))),
+    }
 }
 
 fn assemble(series: Vec<Rates>) -> Samples {

@@ -79,7 +79,7 @@ impl<'a> Dynamics<'a> {
             tree: Tree::new(&turned),
             phi,
             armature,
-            actuated: plant.actuated(),
+            actuated: plant.actuated().to_vec(),
             coordinates: m,
             ws: Workspace::default(),
             task: Samples::zeros(m, 1),

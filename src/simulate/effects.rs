@@ -195,7 +195,7 @@ impl Effects {
             let factor = 1.0 + self.perturb * rng.random_range(-1.0..1.0);
             phi.extend(body.inertia.0.map(|p| p * factor));
         }
-        if let (Some(load), Some(body)) = (self.payload, tool_body(plant)) {
+        if let (Some(load), Some(body)) = (self.payload, plant.tool()) {
             for k in 0..10 {
                 phi[10 * body + k] += load.0[k];
             }
@@ -231,13 +231,4 @@ pub fn parse_payload(text: &str) -> Result<Inertia> {
         )));
     }
     Ok(load)
-}
-
-/// The body that carries the load: the platform of a parallel robot, the last body of others.
-pub fn tool_body(plant: &Plant) -> Option<usize> {
-    let bodies = &plant.robot().bodies;
-    let platform = plant
-        .mechanism()
-        .and_then(|_| bodies.iter().position(|b| b.name == "platform"));
-    platform.or_else(|| bodies.len().checked_sub(1))
 }

@@ -56,6 +56,7 @@ pub fn true_parameters(plant: &Plant, settings: &Settings) -> Vec<f64> {
     let one = |kind: Kind| match kind {
         Kind::Inertial { body, k } => phi[10 * body + k],
         Kind::Term { joint, term } => terms[joint][term as usize],
+        Kind::Nuisance => 0.0,
     };
     plant.parameters().iter().map(|p| one(p.kind)).collect()
 }
@@ -292,7 +293,7 @@ pub fn monte_carlo(
 /// Standard deviations from the commanded motion, as the report before the run predicts them, for
 /// `count` samples.
 fn predict(setup: &Setup, fourier: &Fourier, count: usize) -> Result<Vec<f64>> {
-    let motion = crate::identifiability::sample_period(fourier);
+    let motion = crate::trajectory::sample_period(fourier);
     let w = setup.plant.regressor(&motion)?;
     let mut w = setup.base.select(w.as_ref());
     for c in 0..w.ncols() {

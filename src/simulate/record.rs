@@ -4,16 +4,12 @@ use super::{Effects, Run};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Payload, Purpose, Record};
 use crate::output::write_atomic;
-use crate::plant::Plant;
+use crate::plant::{DEFAULT_NOISE, Plant};
 use nalgebra::{Rotation3, UnitQuaternion};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write as _;
 use std::path::Path;
-
-/// Noise assumed where a robot file states none, as a fraction of the effort limit (or of 100 N m
-/// or N); the figure of the report before the run.
-pub const DEFAULT_NOISE: f64 = crate::identifiability::DEFAULT_NOISE;
 
 /// The sensors of a robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,19 +24,11 @@ impl Sensors {
     /// As the robot file states them, the noise times `scale` (0: ideal sensors). Torque noise that
     /// is not stated is assumed, with a warning; position steps that are not stated are 0.
     pub fn new(plant: &Plant, scale: f64) -> (Self, Vec<Warning>) {
-        let mut missing = Vec::new();
         let joints = plant.actuators();
-        let torque_noise = joints
-            .iter()
-            .map(|j| {
-                scale
-                    * j.torque_noise.unwrap_or_else(|| {
-                        missing.push(j.name.as_str());
-                        let effort = j.limits.effort;
-                        DEFAULT_NOISE * if effort.is_finite() { effort } else { 100.0 }
-                    })
-            })
-            .collect();
+        let (noise, _) = plant.torque_noise();
+        let torque_noise = noise.iter().map(|n| scale * n).collect();
+        let unstated = joints.iter().filter(|j| j.torque_noise.is_none());
+        let missing: Vec<&str> = unstated.map(|j| j.name.as_str()).collect();
         let resolution = joints
             .iter()
             .map(|j| match scale > 0.0 {

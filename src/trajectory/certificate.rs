@@ -189,6 +189,17 @@ impl TorqueBound {
     }
 }
 
+/// How it is known that kinematic limits hold between the samples, the strongest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Proof {
+    /// exact extrema of a series over all time
+    Exact,
+    /// interval arithmetic on the closed form of the kinematics, rounding included
+    Enclosed,
+    /// a bound from twice the largest second difference of the samples: stated, not proven
+    Stated,
+}
+
 /// What is proven of one joint.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct JointCertificate {

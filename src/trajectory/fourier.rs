@@ -258,6 +258,15 @@ pub(crate) fn sin_cos_turns(h: u32, turns: f64) -> (f64, f64) {
     (TAU * (x - x.floor())).sin_cos()
 }
 
+/// Rate of the samples that condition numbers and predictions refer to, Hz.
+pub const RATE: f64 = 100.0;
+
+/// One period at [`RATE`] (at least 20 samples), the end point left out.
+pub fn sample_period(fourier: &Fourier) -> crate::dynamics::Samples {
+    let count = ((fourier.period * RATE).round() as usize).clamp(20, 1_000_000);
+    fourier.motion(count)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

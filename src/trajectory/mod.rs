@@ -20,11 +20,11 @@ pub mod torque;
 pub mod transition;
 
 pub use basis::{Basis, Ends};
-pub use certificate::{Certificate, TorqueBound, certify};
+pub use certificate::{Certificate, Proof, TorqueBound, certify};
 pub use extrema::{Extrema, Extremum, extrema};
 pub use extrema_fast::extrema_fast;
 pub use file::{Space, Trajectory};
-pub use fourier::{Fourier, Series};
+pub use fourier::{Fourier, RATE, Series, sample_period};
 pub use grid::Grid;
 pub use samples::Samples;
 pub use table::{Sampled, Table};

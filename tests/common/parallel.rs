@@ -3,11 +3,11 @@
 
 use super::shared::checks;
 use excite::dynamics::Samples;
+use excite::mechanism::Mechanism;
 use excite::mechanism::delta::Delta;
 use excite::mechanism::gough_stewart::{self, GoughStewart, Leg};
 use excite::mechanism::h4::{H4, Model};
 use excite::mechanism::parallelogram::{self, Chain, motor_frame};
-use excite::mechanism::{Mechanism, closed_certificate};
 use excite::robot::{Inertia, Limits};
 use excite::trajectory::Fourier;
 use nalgebra::{Matrix3, Vector3};
@@ -170,8 +170,8 @@ fn pieces(fourier: &Fourier, count: usize, mut see: impl FnMut(usize, &Samples))
 
 /// Nothing exceeds its bound at 100 kHz, and the bounds are close.
 pub fn check_at_100_khz(mechanism: &Mechanism, fourier: &Fourier) {
-    let c = closed_certificate(mechanism, fourier, 1.0).unwrap();
-    assert!(c.proven);
+    let c = mechanism.certify(fourier, 1.0).unwrap();
+    assert!(c.proven());
     let count = (fourier.period * 1e5) as usize;
     let na = mechanism.actuators();
     let mut most = vec![[0.0f64; 4]; na];

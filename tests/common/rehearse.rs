@@ -1,13 +1,12 @@
 //! Rehearsals: a motion is designed, a robot follows it in simulation, and its sensors are read.
 
-use excite::design::{Condition, Settings as Design, design_plant};
+use excite::design::{Condition, Settings as Design, design};
 use excite::diagnose::record::Raw;
 use excite::plant::Plant;
 use excite::simulate::record::{Sensors, measure};
 use excite::simulate::{Effects, Settings as Simulation, simulate};
 use excite::trajectory::{Ends, Fourier, Grid};
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// A designed motion of a bundled robot: three odd harmonics of five seconds. One is designed for each robot, and
@@ -30,7 +29,7 @@ pub fn motion(robot: &str) -> Fourier {
             ..Design::default()
         };
         let plant = Plant::load(robot).unwrap();
-        let found = design_plant(&plant, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
+        let found = design(&plant, &settings).unwrap();
         found.trajectory.fourier
     })
     .clone()

@@ -5,7 +5,7 @@ use excite::Result;
 use excite::mechanism::scalar::Scalar;
 use excite::mechanism::tree::{Builder, Place};
 use excite::mechanism::{
-    Closed, Coordinates, Group, Kinematics, Mechanism, Pattern, Segment, Setup, Task,
+    ClosedForm, Coordinates, Group, Kinematics, Mechanism, Pattern, Segment, Setup, Source, Task,
 };
 use excite::robot::{JointTerm, Motion};
 use nalgebra::{Matrix3, Vector3};
@@ -101,11 +101,11 @@ pub fn build(rails: usize, seed: u64) -> Result<Mechanism> {
     tree.set(platform, super::inertia(r));
     groups.push(Group::one("platform", platform, Pattern::Full));
     Mechanism::new(Setup {
-        kind: "tripod",
+        source: Source::Code("tripod".into()),
         robot: tree.robot("tripod", Vector3::new(0.3, -0.2, -9.7)),
         actuated: (0..rails).collect(),
         task: Task::Translation,
-        geometry: Box::new(Closed::<_, 3>(Tripod {
+        geometry: Box::new(ClosedForm::<_, 3>(Tripod {
             rails: points,
             rod: 0.7,
         })),

@@ -222,11 +222,9 @@ fn the_controller_of_the_emps() {
 
 /// An identified six-axis arm whose machine differs by `perturb`, with a load or none.
 fn identified(perturb: f64, load: Option<f64>) -> Diagnosis {
-    let Plant::Serial(mut robot) = Plant::load("ur5e").unwrap() else {
-        panic!("an arm is a serial robot")
-    };
+    let mut robot = excite::Robot::load("ur5e").unwrap();
     robot.prior = Prior::Identified;
-    let plant = Plant::Serial(robot);
+    let plant = Plant::from(robot);
     let mut sim = settings(Controller::Feedforward, 15.0, perturb);
     sim.effects.payload = load.map(|m| {
         let com = nalgebra::Vector3::new(0.02, 0.0, 0.06);

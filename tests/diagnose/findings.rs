@@ -35,7 +35,7 @@ fn robots() -> (Plant, excite::Robot) {
     for body in &mut machine.bodies {
         body.inertia.0.iter_mut().for_each(|v| *v *= 1.07);
     }
-    (Plant::Serial(model), machine)
+    (Plant::from(model), machine)
 }
 
 /// A motion of odd harmonics and one of others, each slow or fast.

@@ -7,8 +7,7 @@ use crate::common::rehearse::{self, log, within, without_commands};
 use excite::diagnose::next::{NOMINAL, Proposal};
 use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
-use excite::identifiability::Assessment;
-use excite::mechanism::closed_certificate;
+use excite::identifiability::assess;
 use excite::plant::Plant;
 use excite::simulate::{Effects, Field};
 use excite::trajectory::{Fourier, Trajectory};
@@ -94,11 +93,11 @@ impl Case {
         n.trajectory.write(&path, false).unwrap();
         let back = Trajectory::read(&path).unwrap();
         assert_eq!(back, n.trajectory);
-        let seen = Assessment::with_plant(&self.plant, &back).unwrap();
+        let seen = assess(&self.plant, Some(&back)).unwrap();
         let excitation = seen.excitation.unwrap();
         assert!(excitation.certificate.satisfied);
         if let Some(m) = self.plant.mechanism() {
-            assert!(closed_certificate(m, &back.fourier, 1.0).unwrap().satisfied);
+            assert!(m.certify(&back.fourier, 1.0).unwrap().satisfied);
         }
         let file = json::json(&d, 1.0);
         assert_eq!(file["next_experiment"]["trajectory"], "next.json");

@@ -19,7 +19,7 @@ fn truth(name: &str, seed: u64) -> (Plant, Vec<f64>) {
     for joint in &mut robot.joints {
         joint.terms = [0.1, 1.0, 0.7, 0.2].map(|x: f64| x * r.random_range(0.5..1.5));
     }
-    let plant = Plant::Serial(robot);
+    let plant = Plant::from(robot);
     // the same factor for all ten of a body keeps it one that can exist
     let mut phi = plant.values();
     let bodies = plant.robot().bodies.len();
@@ -648,11 +648,8 @@ fn emps_gives_the_published_values() {
 #[test]
 fn panda_predicts_its_second_half() {
     let Some(e) = recorded("panda") else { return };
-    let Plant::Serial(robot) = e.plant else {
-        panic!()
-    };
     let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
-    let plant = Plant::Serial(robot.with_terms(&terms));
+    let plant = e.plant.with_terms(&terms);
     let id = identify(&plant, &e.records, &Settings::default()).unwrap();
     let h = id.validation.holdout.as_ref().unwrap().relative_error;
     println!(

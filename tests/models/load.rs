@@ -103,9 +103,9 @@ impl Default for Truth {
 fn torque(plant: &Plant, x: &Samples, truth: &Truth, seed: u64) -> Vec<f64> {
     let mut r = ChaCha8Rng::seed_from_u64(seed);
     let mut tau = plant.nominal_torque(x).unwrap();
-    let tool = excite::simulate::effects::tool_body(plant).unwrap();
+    let tool = plant.tool().unwrap();
     if let Some(load) = truth.load {
-        let w = excite::load::system::tool_columns(plant, tool, x).unwrap();
+        let w = plant.body_columns(tool, x).unwrap();
         for (i, t) in tau.iter_mut().enumerate() {
             *t += (0..10).map(|k| w[(i, k)] * load.0[k]).sum::<f64>();
         }

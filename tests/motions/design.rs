@@ -7,11 +7,11 @@ use crate::common::compare::largest;
 use excite::base::BaseParameters;
 use excite::design::criterion::{Condition, Criterion, Objective};
 use excite::design::information::{Evaluation, Information};
-use excite::design::{Design, Settings, Status, design};
-use excite::identifiability::Assessment;
+use excite::design::{Control, Design, Settings, Status, design, design_with};
+use excite::identifiability::assess;
 use excite::robot::{JointTerm, Robot};
 use excite::trajectory::{Basis, Ends, Grid};
-use excite::{Error, Result};
+use excite::{Error, Plant, Result};
 use rand::Rng;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -29,7 +29,7 @@ const CONDITIONS: [Condition; 4] = [
 ];
 
 fn run(robot: &Robot, settings: &Settings) -> Result<Design> {
-    design(robot, settings, &AtomicBool::new(false), &|_| {})
+    design(&robot.into(), settings)
 }
 
 fn small(starts: usize) -> Settings {
@@ -50,7 +50,8 @@ fn problem(seed: u64, condition: Condition) -> (Information<'static>, Vec<f64>) 
     };
     let noise: Vec<f64> = (0..robot.dof()).map(|j| 0.1 + 0.3 * j as f64).collect();
     let weights = (condition == Condition::Weighted).then_some(&noise[..]);
-    let info = Information::new(&robot, &basis, 3.0, 80, transform, weights);
+    let plant = Box::leak(Box::new(Plant::from(&robot)));
+    let info = Information::new(plant, &basis, 3.0, 80, transform, weights);
     let r = &mut common::rng(seed + 1);
     let x = (0..info.len()).map(|_| r.random_range(-0.6..0.6)).collect();
     (info, x)
@@ -138,7 +139,7 @@ fn check_limits(d: &Design) {
     let count = (1e5 * f.period) as usize;
     let table = excite::trajectory::Table::new(f.period, &f.harmonics, count);
     let mut values = vec![0.0; count];
-    for (series, joint) in f.joints.iter().zip(&d.robot.joints) {
+    for (series, joint) in f.joints.iter().zip(&d.plant.robot().joints) {
         let l = &joint.limits;
         let bands = [
             (0, l.position[0], l.position[1]),
@@ -201,7 +202,7 @@ fn designs_stay_inside_every_limit_at_100_khz() {
         let robot = Robot::load(name).unwrap();
         let d = run(&robot, &settings).unwrap();
         check_limits(&d);
-        let e = Assessment::new(&d.robot, &d.trajectory)
+        let e = assess(&d.plant, Some(&d.trajectory))
             .unwrap()
             .excitation
             .unwrap();
@@ -221,7 +222,7 @@ fn the_reference_problems_are_solved() {
     for (name, bound) in [("panda", 7.2), ("ur10", 7.2)] {
         let d = run(&Robot::load(name).unwrap(), &small(4)).unwrap();
         assert!(d.value < bound, "{name}: {}", d.value);
-        let e = Assessment::new(&d.robot, &d.trajectory)
+        let e = assess(&d.plant, Some(&d.trajectory))
             .unwrap()
             .excitation
             .unwrap();
@@ -271,17 +272,22 @@ fn start_posture_is_kept() {
 
 #[test]
 fn interruption_keeps_the_best_so_far() {
-    let robot = Robot::load("panda").unwrap();
+    let plant = Plant::load("panda").unwrap();
     let stop = AtomicBool::new(false);
-    let d = design(&robot, &small(400), &stop, &|_| {
-        stop.store(true, Ordering::Relaxed)
-    })
-    .unwrap();
+    let first = Control {
+        cancel: &stop,
+        progress: &|_| stop.store(true, Ordering::Relaxed),
+    };
+    let d = design_with(&plant, &small(400), &first).unwrap();
     assert_eq!(d.record.status, Status::Interrupted);
     assert!(d.record.starts.len() < 400);
     check_limits(&d);
     // even when it comes before anything was done
-    let d = design(&robot, &small(400), &AtomicBool::new(true), &|_| {}).unwrap();
+    let before = Control {
+        cancel: &AtomicBool::new(true),
+        ..Control::default()
+    };
+    let d = design_with(&plant, &small(400), &before).unwrap();
     assert_eq!(d.record.status, Status::Interrupted);
     check_limits(&d);
 }
@@ -401,11 +407,8 @@ fn what_is_not_certified_is_not_a_result() {
         };
         match run(&robot, &settings) {
             Ok(d) => {
-                let tree = excite::dynamics::Tree::new(&d.robot);
-                let c =
-                    excite::identifiability::certificate(&d.robot, &tree, &d.trajectory.fourier)
-                        .unwrap();
-                assert!(c.satisfied, "{criterion:?} {seed}: {:?}", c.worst);
+                let c = d.plant.certify(&d.trajectory.fourier, 1.0).unwrap();
+                assert!(c.satisfied(), "{criterion:?} {seed}: {:?}", c.broken());
                 designed += 1;
             }
             Err(e) => {

@@ -7,14 +7,13 @@ use common::parallel::{self, check_at_100_khz};
 use excite::Plant;
 use excite::design::criterion::{Condition, Criterion, Objective};
 use excite::design::information::{Evaluation, Information};
-use excite::design::{Design, Settings, design_closed};
+use excite::design::{Design, Settings, design};
 use excite::dynamics::Samples;
-use excite::identifiability::Assessment;
-use excite::mechanism::{Mechanism, closed_certificate};
+use excite::identifiability::assess;
+use excite::mechanism::Mechanism;
 use excite::robot::{JointTerm, Limits};
 use excite::trajectory::{Basis, Ends, Fourier, Space, Trajectory, certify};
 use rand::Rng;
-use std::sync::atomic::AtomicBool;
 
 /// Hexapod of the reference model with friction, limits and cones.
 fn hexapod() -> Mechanism {
@@ -46,7 +45,7 @@ fn mechanism(plant: &Plant) -> &Mechanism {
 }
 
 fn run(mechanism: &Mechanism, settings: &Settings) -> Design {
-    design_closed(mechanism, settings, &AtomicBool::new(false), &|_| {}).unwrap()
+    design(&Plant::from(mechanism), settings).unwrap()
 }
 
 fn quick(starts: usize) -> Settings {
@@ -68,7 +67,8 @@ fn gradients_are_the_differences_of_the_criterion() {
         let basis = Basis::new(&[1, 2, 3], Ends::Rest, 6, None).unwrap();
         let noise = [1.0, 2.0, 1.5, 3.0, 1.0, 2.5];
         let weights = (condition == Condition::Weighted).then_some(&noise[..]);
-        let info = Information::closed(&mechanism, &basis, 4.0, 60, base.selection(), weights);
+        let plant = Plant::from(&mechanism);
+        let info = Information::new(&plant, &basis, 4.0, 60, base.selection(), weights);
         let m = basis.free();
         let r = &mut common::rng(4);
         let mut x = Vec::new();
@@ -122,7 +122,7 @@ fn limits_hold_at_100_khz_for_designs_that_use_them() {
         ..quick(1)
     };
     let design = run(&hexapod, &settings);
-    let c = closed_certificate(&hexapod, &design.trajectory.fourier, 1.0).unwrap();
+    let c = hexapod.certify(&design.trajectory.fourier, 1.0).unwrap();
     assert!(c.satisfied, "{:?}", c.actuators.worst);
     let worst = c.actuators.worst.as_ref().unwrap();
     assert!(worst.used > 0.9, "limits are meant to be used: {worst:?}");
@@ -135,7 +135,7 @@ fn bundled_parallel_robots_are_designed_inside_their_limits() {
         let plant = bundled(name);
         let m = mechanism(&plant);
         let design = run(m, &quick(1));
-        let a = Assessment::with_plant(&plant, &design.trajectory).unwrap();
+        let a = assess(&plant, Some(&design.trajectory)).unwrap();
         let e = a.excitation.unwrap();
         assert!(e.certificate.satisfied, "{name}: {:?}", e.certificate.worst);
         println!("{name}: {:?}", e.condition);
@@ -196,8 +196,8 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
         let t = &design.trajectory;
         assert_eq!(t.space, Some(Space::Actuators));
         assert_eq!(t.joints, own.actuator_names());
-        let c = closed_certificate(&own, &t.fourier, 1.0).unwrap();
-        assert!(c.satisfied && c.proven, "{:?}", c.actuators.worst);
+        let c = own.certify(&t.fourier, 1.0).unwrap();
+        assert!(c.satisfied && c.proven(), "{:?}", c.actuators.worst);
         // the series are the actuators: the certificate of a serial robot
         let exact = certify(&own.actuator_robot(), &t.fourier).unwrap();
         for (a, b) in c.actuators.joints.iter().zip(&exact.joints) {
@@ -224,7 +224,7 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
         let read = Trajectory::parse(&t.to_json().unwrap(), "t.json").unwrap();
         assert_eq!(read, *t);
         let condition = |t: &Trajectory| {
-            let a = Assessment::with_plant(&plant, t).unwrap();
+            let a = assess(&plant, Some(t)).unwrap();
             let e = a.excitation.unwrap();
             assert!(e.certificate.satisfied, "{:?}", e.certificate.worst);
             e.condition.normalised
@@ -301,7 +301,7 @@ fn conditions_are_well_below_those_of_random_multisines() {
         };
         let design = run(&m, &settings);
         let w = m
-            .regressor(&excite::identifiability::sample_period(
+            .regressor(&excite::trajectory::sample_period(
                 &design.trajectory.fourier,
             ))
             .unwrap();

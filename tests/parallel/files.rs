@@ -399,7 +399,7 @@ fn mistakes_are_named_with_their_line() {
     // friction of a passive joint is a column of its own
     let with = format!("{hexapod}{twice}identify = [\"viscous\"]\n");
     let m = Mechanism::from_toml_str(&with, "robot.toml").unwrap();
-    let known = |p: &excite::mechanism::Parameter| p.name == "leg2_beta.viscous";
+    let known = |p: &excite::plant::Parameter| p.name == "leg2_beta.viscous";
     assert!(m.parameters.list.iter().any(|p| known(p) && p.value == 0.1));
 }
 
@@ -535,7 +535,7 @@ fn an_identified_mechanism_is_written_and_read() {
     ];
     for (i, text) in files.iter().enumerate() {
         let m = Mechanism::from_toml_str(text, "robot.toml").unwrap();
-        let plant = Plant::Parallel(Box::new(m));
+        let plant = Plant::from(m);
         let m = plant.mechanism().unwrap();
         // every body by a factor of its own, so that it stays one that can exist
         let r = &mut common::rng(i as u64);
@@ -568,7 +568,7 @@ fn an_identified_mechanism_is_written_and_read() {
         assert!(off < 1e-12 * size, "{i}: {off:e}\n{toml}");
     }
     // what a file cannot carry is said
-    let plant = Plant::Parallel(Box::new(bundled::find("delta").unwrap().load().unwrap()));
+    let plant = Plant::from(bundled::find("delta").unwrap().load().unwrap());
     let mut phi = plant.values();
     phi[0] = -0.1;
     let tree = robot::with_values(&plant, &phi);

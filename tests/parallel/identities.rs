@@ -7,7 +7,7 @@ use excite::dynamics::{Isa, Samples, Workspace};
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart};
 use excite::mechanism::h4::{H4, Model};
 use excite::mechanism::parallelogram::motor_frame;
-use excite::mechanism::{ClosedMotion, ClosedWorkspace, Mechanism, TaskDerivatives};
+use excite::mechanism::{Mechanism, MechanismMotion, MechanismWorkspace, TaskDerivatives};
 use excite::robot::{Body, JointTerm};
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
@@ -92,9 +92,9 @@ fn regressor_times_parameters_is_inverse_dynamics() {
             let size: f64 = (0..phi.len()).map(|c| (w[(row, c)] * phi[c]).abs()).sum();
             worst = worst.max((sum - (tau[row] - known[row])).abs() / (1.0 + size));
         }
-        println!("{} {i}: {worst:.1e}", m.kind);
-        assert!(worst < 1e-13, "{} {i}: {worst:e}", m.kind);
-        if m.kind == "gough-stewart" && m.parameters.plain || m.kind == "tripod" {
+        println!("{} {i}: {worst:.1e}", m.source.name());
+        assert!(worst < 1e-13, "{} {i}: {worst:e}", m.source.name());
+        if m.source.name() == "gough-stewart" && m.parameters.plain || m.source.name() == "tripod" {
             nominal.iter_mut().zip(&tau).for_each(|(a, b)| *a -= b);
             assert!(nominal.iter().all(|d| d.abs() < 1e-9));
         }
@@ -105,9 +105,9 @@ fn regressor_times_parameters_is_inverse_dynamics() {
 fn every_instruction_set_gives_the_same_bits() {
     let m = random_hexapod(1).build().unwrap();
     let x = states(&m, 77, 9, 5.0);
-    let mut first: Option<(ClosedMotion, Vec<f64>)> = None;
+    let mut first: Option<(MechanismMotion, Vec<f64>)> = None;
     for isa in Isa::available() {
-        let mut closed = ClosedMotion::default();
+        let mut closed = MechanismMotion::default();
         m.motion_into(isa, &x, &mut closed).unwrap();
         let rows = 6 * x.count;
         let mut w = vec![0.0; rows * m.parameters.raw_count()];
@@ -149,12 +149,12 @@ fn velocities_accelerations_and_jacobian_are_derivatives_of_positions() {
             assert!(
                 (closed.tree.qd[i] - v).abs() < 1e-5 * (1.0 + v.abs()),
                 "{} {i}",
-                m.kind
+                m.source.name()
             );
             assert!(
                 (closed.tree.qdd[i] - w).abs() < 1e-4 * (1.0 + w.abs()),
                 "{} {i}",
-                m.kind
+                m.source.name()
             );
             for k in 0..x.dof {
                 let step = |h: f64| {
@@ -232,7 +232,7 @@ fn energy(m: &Mechanism, path: &dyn Fn(f64) -> Vec<f64>, s: f64) -> f64 {
 #[test]
 fn actuator_power_is_the_change_of_energy() {
     for m in mechanisms() {
-        if m.kind == "h4" && m.parameters.list.len() < 20 {
+        if m.source.name() == "h4" && m.parameters.list.len() < 20 {
             continue; // the lumped model is no set of bodies
         }
         let x = states(&m, 1, 21, 5.0);
@@ -259,7 +259,7 @@ fn actuator_power_is_the_change_of_energy() {
         assert!(
             (power - change).abs() < 1e-3 * (1.0 + power.abs()),
             "{}: {power} {change}",
-            m.kind
+            m.source.name()
         );
     }
 }
@@ -276,8 +276,14 @@ fn gradients_are_those_of_difference_quotients() {
             .map(|_| r.random_range(-1.0..1.0))
             .collect();
         let mut out = TaskDerivatives::default();
-        m.gradients(&mut ClosedWorkspace::default(), &raw, &x, &rates, &mut out)
-            .unwrap();
+        m.gradients(
+            &mut MechanismWorkspace::default(),
+            &raw,
+            &x,
+            &rates,
+            &mut out,
+        )
+        .unwrap();
         // Σ r τ of vector v at sample s, from the raw regressor
         let value = |x: &Samples, v: usize, s: usize| -> f64 {
             let closed = m.motion(x).unwrap();
@@ -309,7 +315,7 @@ fn gradients_are_those_of_difference_quotients() {
                     assert!(
                         (g - quotient).abs() < 2e-6 * scale,
                         "{} order {order} k {k}: {g} {quotient}",
-                        m.kind
+                        m.source.name()
                     );
                 }
             }
@@ -327,7 +333,12 @@ fn forward_after_inverse_is_the_identity() {
             let back = m.forward(&q, &m.home).unwrap();
             assert!(back.residual < 1e-11 && back.iterations < 40);
             for (a, b) in back.x.iter().zip(&pose) {
-                assert!((a - b).abs() < 1e-10, "{}: {:?} {pose:?}", m.kind, back.x);
+                assert!(
+                    (a - b).abs() < 1e-10,
+                    "{}: {:?} {pose:?}",
+                    m.source.name(),
+                    back.x
+                );
             }
         }
     }

@@ -4,16 +4,15 @@ use crate::common::compare::relative;
 use crate::common::parallel::{check_at_100_khz, delta, h4, hexapod, reference, states};
 use crate::common::rng;
 use excite::Plant;
-use excite::design::{Condition, Settings, design_closed};
+use excite::design::{Condition, Settings, design};
 use excite::dynamics::{Isa, Samples};
-use excite::identifiability::Assessment;
+use excite::identifiability::assess;
 use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
-use excite::mechanism::{ClosedWorkspace, Mechanism, TaskDerivatives, closed_certificate};
+use excite::mechanism::{Mechanism, MechanismWorkspace, TaskDerivatives};
 use excite::trajectory::{Space, Trajectory, certify};
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 fn frame(body: usize, position: Vector3<f64>) -> Frame {
     Frame {
@@ -132,8 +131,15 @@ fn loops_move_as_the_closed_form_does() {
                 &closed.nominal_torque(&x).unwrap(),
             ),
         ];
-        println!("{}: q, qd, qdd, torque off by {off:?}", closed.kind);
-        assert!(off.iter().all(|o| *o < 1e-9), "{}: {off:?}", closed.kind);
+        println!(
+            "{}: q, qd, qdd, torque off by {off:?}",
+            closed.source.name()
+        );
+        assert!(
+            off.iter().all(|o| *o < 1e-9),
+            "{}: {off:?}",
+            closed.source.name()
+        );
         let w = loops.regressor(&actuators).unwrap();
         let v = closed.regressor(&x).unwrap();
         assert_eq!(w.ncols(), v.ncols());
@@ -142,7 +148,7 @@ fn loops_move_as_the_closed_form_does() {
             let column = |m: &faer::Mat<f64>| (0..m.nrows()).map(|r| m[(r, c)]).collect::<Vec<_>>();
             off = off.max(relative(&column(&w), &column(&v)));
         }
-        println!("{}: regressor off by {off:.1e}", closed.kind);
+        println!("{}: regressor off by {off:.1e}", closed.source.name());
         assert!(off < 1e-9);
         // the same rank over the same motions
         let (x, actuators) = motions(&closed, 300, 4);
@@ -159,7 +165,7 @@ fn loops_move_as_the_closed_form_does() {
         let own = loops.base().unwrap();
         println!(
             "{}: {} base, gap {:.1e}",
-            closed.kind,
+            closed.source.name(),
             own.count(),
             own.rank_gap
         );
@@ -218,7 +224,8 @@ fn derivatives(m: &Mechanism, seed: u64) {
     }
     println!(
         "{} {}: D, dqd, dqdd, curvature off by {off:?}",
-        m.kind, m.robot.name
+        m.source.name(),
+        m.robot.name
     );
     assert!(off.iter().all(|o| *o < 1e-7), "{off:?}");
 }
@@ -241,7 +248,7 @@ fn derivatives_are_those_of_differences() {
         let raw = m.parameters.expand(&m.parameters.values());
         let rates: Vec<f64> = (0..m.actuators()).map(|a| 0.7 - 0.4 * a as f64).collect();
         let mut out = TaskDerivatives::default();
-        let ws = &mut ClosedWorkspace::default();
+        let ws = &mut MechanismWorkspace::default();
         m.gradients(ws, &raw, &x, &rates, &mut out).unwrap();
         let sum = |x: &Samples| -> f64 {
             let tau = m.torque(x, &m.parameters.values()).unwrap();
@@ -324,7 +331,10 @@ fn file(toml: &str, urdf: &str) -> excite::Result<Mechanism> {
 fn a_five_bar_is_the_textbook_one() {
     let m = five_bar(POINT).unwrap();
     println!("{:?}", m.warnings);
-    assert_eq!((m.freedoms(), m.actuators(), m.kind), (2, 2, "loops"));
+    assert_eq!(
+        (m.freedoms(), m.actuators(), m.source.name()),
+        (2, 2, "loops")
+    );
     assert_eq!(m.task_names, ["motor_left", "motor_right"]);
     // tip by the intersection of two circles
     let states = m.random_states(50, 2);
@@ -387,12 +397,12 @@ fn a_five_bar_is_designed_in_its_actuators() {
         condition: Condition::Normalised,
         ..Settings::default()
     };
-    let design = design_closed(&m, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
+    let design = design(&Plant::from(&m), &settings).unwrap();
     let t = &design.trajectory;
     assert_eq!(t.space, Some(Space::Actuators));
     // as for a serial robot: exact, forces excepted
-    let c = closed_certificate(&m, &t.fourier, 1.0).unwrap();
-    assert!(c.satisfied && c.proven);
+    let c = m.certify(&t.fourier, 1.0).unwrap();
+    assert!(c.satisfied && c.proven());
     let exact = certify(&m.actuator_robot(), &t.fourier).unwrap();
     for (a, b) in c.actuators.joints.iter().zip(&exact.joints) {
         assert_eq!((a.velocity, a.jerk), (b.velocity, b.jerk));
@@ -400,9 +410,9 @@ fn a_five_bar_is_designed_in_its_actuators() {
     check_at_100_khz(&m, &t.fourier);
     let text = t.to_json().unwrap();
     assert!(text.contains("\"coordinates\": \"actuators\""));
-    let plant = Plant::Parallel(Box::new(m));
+    let plant = Plant::from(m);
     let read = Trajectory::parse(&text, "t.json").unwrap();
-    let a = Assessment::with_plant(&plant, &read).unwrap();
+    let a = assess(&plant, Some(&read)).unwrap();
     let condition = a.excitation.unwrap().condition.normalised;
     println!("five-bar: condition number {condition:.1}");
     assert!(condition < 100.0, "{condition}");
@@ -562,7 +572,7 @@ fn an_identified_tree_with_loops_is_written_and_read() {
                   [[loop]]\nframes = [{ link = \"tip\", position = [0.01, 0, 0], rpy = [0.1, 0.2, 0.3] }, \
                   { link = \"right2\", position = [0.31, 0, 0], rpy = [0.1, 0.2, 0.3] }]\ncoincide = \"position\"\n";
     for rest in [POINT, POSE, REDUNDANT, frames] {
-        let plant = Plant::Parallel(Box::new(five_bar(rest).unwrap()));
+        let plant = Plant::from(five_bar(rest).unwrap());
         let mut phi = plant.values();
         let r = &mut rng(7);
         let bodies = 10 * plant.mechanism().unwrap().parameters.bodies.len();

@@ -4,20 +4,19 @@
 //! closed as a loop by Newton's method.
 
 use crate::common::compare::difference;
-use excite::design::{Condition, Settings, design_closed};
+use excite::design::{Condition, Settings, design};
 use excite::dynamics::Samples;
-use excite::identifiability::Assessment;
+use excite::identifiability::assess;
 use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
 use excite::mechanism::scalar::{Pack, Scalar};
 use excite::mechanism::tree::{Builder, Place};
 use excite::mechanism::{
-    Closed, ClosedWorkspace, Coordinates, Group, Kinematics, Mechanism, Pattern, Segment, Setup,
-    Task, TaskDerivatives,
+    ClosedForm, Coordinates, Group, Kinematics, Mechanism, MechanismWorkspace, Pattern, Segment,
+    Setup, Source, Task, TaskDerivatives,
 };
 use excite::robot::{Inertia, JointTerm, Limits, Motion};
 use excite::{Plant, Result};
 use nalgebra::{Matrix3, Vector3};
-use std::sync::atomic::AtomicBool;
 
 /// Distance of the motors, lengths of the driven and of the distal links, m.
 const BASE: f64 = 0.15;
@@ -90,6 +89,10 @@ impl Kinematics for FiveBar {
 }
 
 fn five_bar() -> Result<Mechanism> {
+    Mechanism::new(five_bar_setup())
+}
+
+fn five_bar_setup() -> Setup {
     let mut tree = Builder::default();
     for k in 1..=2 {
         tree.coordinate(&format!("motor{k}"), Motion::Revolute);
@@ -128,16 +131,16 @@ fn five_bar() -> Result<Mechanism> {
             tree.set(body, Inertia::from_com(mass, com, tensor));
         }
     }
-    Mechanism::new(Setup {
-        kind: "five-bar",
+    Setup {
+        source: Source::Code("five-bar".into()),
         robot: tree.robot("five-bar", Vector3::new(0.0, -9.81, 0.0)),
         actuated: vec![0, 1],
         task: Task::Joints(2),
-        geometry: Box::new(Closed::<_, 2>(FiveBar)),
+        geometry: Box::new(ClosedForm::<_, 2>(FiveBar)),
         groups,
         home: vec![2.2, 0.9],
         length: DRIVEN,
-    })
+    }
 }
 
 /// The same tree, its distal links joined by Newton's method.
@@ -190,7 +193,7 @@ fn its_gradients_are_those_of_differences() {
     let rates = [0.7, -0.4];
     let values = m.parameters.values();
     let mut out = TaskDerivatives::default();
-    let ws = &mut ClosedWorkspace::default();
+    let ws = &mut MechanismWorkspace::default();
     let raw = m.parameters.expand(&values);
     m.gradients(ws, &raw, &x, &rates, &mut out).unwrap();
     let sum = |x: &Samples| -> f64 {
@@ -224,15 +227,36 @@ fn it_is_judged_and_designed_like_those_that_come_with_the_program() {
         condition: Condition::Normalised,
         ..Settings::default()
     };
-    let design = design_closed(&m, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
-    let plant = Plant::Parallel(Box::new(m));
-    let alone = Assessment::of_plant(&plant).unwrap();
+    let design = design(&Plant::from(&m), &settings).unwrap();
+    let plant = Plant::from(m);
+    let alone = assess(&plant, None).unwrap();
     assert!(alone.mechanism && alone.base.count() == base.count());
-    let a = Assessment::with_plant(&plant, &design.trajectory).unwrap();
+    let a = assess(&plant, Some(&design.trajectory)).unwrap();
     let e = a.excitation.unwrap();
     assert!(e.certificate.satisfied, "{:?}", e.certificate.worst);
     println!("{} base parameters, {:?}", base.count(), e.condition);
     assert!(e.condition.normalised < 100.0);
     let p = e.platform.unwrap();
-    assert!(p.certificate.proven && p.poses.len() == 3);
+    assert!(p.certificate.proven() && p.poses.len() == 3);
+}
+
+#[test]
+fn a_mechanism_of_user_code_is_not_written_as_another_kind() {
+    let mut m = five_bar().unwrap();
+    // as if it had been read from a file
+    m.text = "mechanism = \"loops\"".into();
+    let error = excite::identify::mechanism::toml(&m, &m.robot, "five_bar.urdf").unwrap_err();
+    assert!(error.to_string().contains("five-bar"), "{error}");
+}
+
+#[test]
+fn unknowns_of_no_body_are_refused() {
+    for bodies in [vec![], vec![99]] {
+        let mut setup = five_bar_setup();
+        setup
+            .groups
+            .push(Group::shared("rod", &bodies, Pattern::Full));
+        let error = Mechanism::new(setup).unwrap_err();
+        assert!(error.to_string().contains("`rod`"), "{error}");
+    }
 }

@@ -1,13 +1,13 @@
 //! The report before the run: what it says, that it stands alone, and that it never breaks.
 
-use excite::Robot;
 use excite::design::record::{Record, Start, Status};
 use excite::design::settings::Settings;
 use excite::identifiability::json::json;
 use excite::identifiability::page::{Grade, html, verdict};
-use excite::identifiability::{Assessment, Excitation};
+use excite::identifiability::{Assessment, Excitation, assess};
 use excite::robot::{JointTerm, bundled};
 use excite::trajectory::{Basis, Ends, Fourier, Grid, Trajectory, certify};
+use excite::{Plant, Robot};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
@@ -89,7 +89,7 @@ fn record() -> Record {
 
 fn panda() -> Assessment {
     let robot = load("panda");
-    Assessment::new(&robot, &motion(&robot, 0.8)).expect("an assessment")
+    assess(&Plant::from(&robot), Some(&motion(&robot, 0.8))).expect("an assessment")
 }
 
 fn excitation(a: &mut Assessment) -> &mut Excitation {
@@ -189,7 +189,7 @@ fn the_same_input_gives_the_same_bytes() {
 #[test]
 fn limits_that_do_not_hold_come_first() {
     let robot = load("panda");
-    let a = Assessment::new(&robot, &motion(&robot, 1.25)).expect("an assessment");
+    let a = assess(&Plant::from(&robot), Some(&motion(&robot, 1.25))).expect("an assessment");
     let v = verdict(&a);
     assert_eq!(v.grade, Grade::Unsafe);
     assert!(v.text.starts_with("Do not run: "), "{}", v.text);
@@ -218,7 +218,7 @@ fn a_motion_that_excites_nothing_is_called_so() {
         series.sin.fill(0.0);
         series.cos.fill(0.0);
     }
-    let a = Assessment::new(&robot, &t).expect("an assessment");
+    let a = assess(&Plant::from(&robot), Some(&t)).expect("an assessment");
     let v = verdict(&a);
     assert_eq!(v.grade, Grade::Unexciting);
     assert!(
@@ -279,7 +279,7 @@ fn the_json_has_its_keys_and_finite_numbers() {
 #[test]
 fn every_bundled_robot_alone_has_a_report() {
     for robot in bundled::list() {
-        let a = Assessment::of_robot(&load(robot.name)).expect("an assessment");
+        let a = assess(&Plant::from(load(robot.name)), None).expect("an assessment");
         let page = html(&a, None);
         stands_alone(&page);
         let v = verdict(&a);
@@ -308,7 +308,7 @@ fn every_bundled_robot_alone_has_a_report() {
 #[test]
 fn joint_terms_have_their_own_table_and_sliding_joints_their_units() {
     let robot = load("scara").with_terms(&JointTerm::ALL);
-    let a = Assessment::new(&robot, &motion(&robot, 0.7)).expect("an assessment");
+    let a = assess(&Plant::from(&robot), Some(&motion(&robot, 0.7))).expect("an assessment");
     let page = html(&a, None);
     stands_alone(&page);
     for expected in ["Joint terms", "joint3.viscous", "m/s²", "Torque or force"] {
@@ -322,7 +322,7 @@ fn names_from_files_are_escaped() {
     robot.name = "<h1>&\"'".into();
     robot.joints[0].name = "<b onload='x'>".into();
     robot.bodies[1].name = "<u>&".into();
-    let a = Assessment::new(&robot, &motion(&robot, 0.5)).expect("an assessment");
+    let a = assess(&Plant::from(&robot), Some(&motion(&robot, 0.5))).expect("an assessment");
     let page = html(&a, None);
     stands_alone(&page);
     for raw in ["<b ", "<u>", "<h1>&"] {

@@ -47,7 +47,7 @@ fn frictionless(name: &str) -> Plant {
         joint.terms[1..].fill(0.0);
         joint.limits.effort = f64::INFINITY;
     }
-    Plant::Serial(robot)
+    Plant::from(robot)
 }
 
 fn quick() -> Settings {
@@ -221,7 +221,7 @@ fn a_joint_with_much_friction_sticks_and_breaks_away() {
     for joint in &mut robot.joints {
         joint.terms = [0.0, 0.1, 2.0, 0.0];
     }
-    let plant = Plant::Serial(robot);
+    let plant = Plant::from(robot);
     let still = |a: f64| Series {
         constant: 0.3,
         sin: vec![a],
@@ -278,10 +278,7 @@ fn stribeck_friction_and_payload_show_in_the_torque() {
     let more = mean(&run) - mean(&plain);
     assert!(more > 22.26 * 9.81 && more < 1.6 * 22.26 * 9.81, "{more}");
     // with the load and the friction taken off, the model fits
-    let mut robot = Plant::load("hexapod").unwrap();
-    let Plant::Parallel(mechanism) = &mut robot else {
-        panic!()
-    };
+    let mut mechanism = Plant::load("hexapod").unwrap().mechanism().unwrap().clone();
     let body = mechanism
         .robot
         .bodies
@@ -290,7 +287,7 @@ fn stribeck_friction_and_payload_show_in_the_torque() {
         .unwrap();
     let load = settings.effects.payload.unwrap();
     mechanism.robot.bodies[body].inertia = mechanism.robot.bodies[body].inertia + load;
-    let tau = robot.nominal_torque(&run.motion).unwrap();
+    let tau = mechanism.nominal_torque(&run.motion).unwrap();
     for a in 0..6 {
         for k in 0..n {
             let v = run.actuators.qd[a * n + k];

@@ -5,7 +5,10 @@ use crate::common::compare::largest;
 
 use common::parallel;
 use excite::Plant;
+use excite::design::{Settings, design};
+use excite::plant::Column;
 use excite::robot::Robot;
+use excite::trajectory::{Fourier, Proof, Series, Space};
 
 fn plants() -> Vec<Plant> {
     let (model, _) = parallel::reference("sg");
@@ -16,9 +19,9 @@ fn plants() -> Vec<Plant> {
         leg.terms = [0.4, 30.0, 12.0, 1.0];
     }
     vec![
-        Plant::Serial(Robot::load("panda").unwrap()),
-        Plant::Parallel(Box::new(hexapod.build().unwrap())),
-        Plant::Parallel(Box::new(parallel::h4(&h4).build().unwrap())),
+        Plant::from(Robot::load("panda").unwrap()),
+        Plant::from(hexapod.build().unwrap()),
+        Plant::from(parallel::h4(&h4).build().unwrap()),
     ]
 }
 
@@ -71,4 +74,84 @@ fn actuators_move_as_the_inverse_kinematics_says() {
             }
         }
     }
+}
+
+#[test]
+fn every_parameter_stands_for_a_column_of_the_robot() {
+    for plant in plants() {
+        for p in plant.parameters() {
+            assert_eq!(p.kind, plant.raw()[p.raw[0]], "{}", p.name);
+            assert_ne!(p.kind, Column::Nuisance, "{}", p.name);
+            let value = match p.kind {
+                Column::Inertial { body, k } => plant.robot().bodies[body].inertia.0[k],
+                Column::Term { joint, term } => plant.robot().joints[joint].terms[term as usize],
+                Column::Nuisance => 0.0,
+            };
+            assert_eq!(p.value, value, "{}", p.name);
+        }
+    }
+}
+
+#[test]
+fn ten_columns_of_a_body_are_those_of_its_unknowns() {
+    for plant in plants() {
+        let x = plant.random_states(5, 2);
+        let w = plant.regressor(&x).unwrap();
+        for body in 0..plant.robot().bodies.len() {
+            let ten = plant.body_columns(body, &x).unwrap();
+            for (u, p) in plant.parameters().iter().enumerate() {
+                if let (Column::Inertial { body: b, k }, [_]) = (p.kind, p.raw.as_slice())
+                    && b == body
+                {
+                    for r in 0..w.nrows() {
+                        assert!((w[(r, u)] - ten[(r, k)]).abs() < 1e-12 * (1.0 + w[(r, u)].abs()));
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_certificate_says_how_it_is_known() {
+    let still = |plant: &Plant| {
+        let states = plant.random_states(1, 4);
+        let middle = plant.home().map_or(states.q, <[f64]>::to_vec);
+        let series = |constant: f64| Series {
+            constant,
+            sin: vec![1e-4],
+            cos: vec![0.0],
+        };
+        Fourier::new(4.0, vec![1], middle.into_iter().map(series).collect()).unwrap()
+    };
+    let hexapod = plants().remove(1);
+    let actuators = hexapod.clone().in_space(Some(Space::Actuators)).unwrap();
+    for (plant, proof) in [
+        (plants().remove(0), Proof::Exact),
+        (hexapod, Proof::Enclosed),
+        (actuators, Proof::Exact),
+    ] {
+        let c = plant.certify(&still(&plant), 1.0).unwrap();
+        assert_eq!(c.proof, proof, "{}", plant.name());
+        assert_eq!(c.mechanism.is_some(), plant.space().is_some());
+        assert_eq!(c.actuators.joints.len(), plant.actuators().len());
+    }
+}
+
+#[test]
+fn half_the_limits_are_kept_by_half_the_motion() {
+    let plant = Plant::load("planar2").unwrap();
+    let settings = Settings {
+        starts: Some(1),
+        derate: 0.5,
+        ..Settings::default()
+    };
+    let motion = design(&plant, &settings).unwrap().trajectory.fourier;
+    let used = |derate: f64| {
+        let c = plant.certify(&motion, derate).unwrap();
+        (c.satisfied(), c.actuators.worst.unwrap().used)
+    };
+    let (whole, half) = (used(1.0), used(0.5));
+    assert!(whole.0 && half.0, "{whole:?} {half:?}");
+    assert!(half.1 > 0.9 && whole.1 < 0.9, "{whole:?} {half:?}");
 }

@@ -4,7 +4,7 @@
 use super::{samples, write};
 use excite::design::Settings;
 use excite::design::diagnostic::{Motion, diagnostic_set};
-use excite::identifiability::Assessment;
+use excite::identifiability::assess;
 use excite::log::Purpose;
 use excite::trajectory::Trajectory;
 use excite::{Error, Plant, Result};
@@ -32,11 +32,7 @@ pub struct Set {
 impl Set {
     /// Makes and certifies the motions about the designed one.
     pub fn new(plant: &Plant, main: &Trajectory, settings: &Settings) -> Result<Self> {
-        let coordinates = match plant {
-            Plant::Serial(robot) => robot.clone(),
-            Plant::Parallel(mechanism) => mechanism.task_robot(),
-        };
-        let motions = diagnostic_set(plant, &coordinates, main, settings)?
+        let motions = diagnostic_set(plant, main, settings)?
             .into_iter()
             .map(|m| {
                 let value = judged(plant, &m)?;
@@ -125,7 +121,7 @@ impl Set {
 
 /// What the report says of a motion.
 fn judged(plant: &Plant, m: &Motion) -> Result<Value> {
-    let assessment = Assessment::with_plant(plant, &m.trajectory)?;
+    let assessment = assess(plant, Some(&m.trajectory))?;
     let Some(e) = &assessment.excitation else {
         return Err(Error::Infeasible(format!("{}: nothing moves", m.name)));
     };

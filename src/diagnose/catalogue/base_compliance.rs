@@ -151,9 +151,10 @@ pub struct Load {
 impl Load {
     /// Of the nominal model; `None` for robots that are not serial.
     pub fn of(cx: &Context) -> Option<Self> {
-        let Plant::Serial(robot) = cx.data.plant else {
+        if !cx.serial() {
             return None;
-        };
+        }
+        let robot = cx.data.plant.robot();
         let tree = crate::dynamics::Tree::new(&on_joints(robot));
         let phi = bodies(cx);
         let mut out = Load {
@@ -190,9 +191,10 @@ pub(crate) fn tilted(
     cx: &Context,
     motion: impl Fn(&Record, usize, usize) -> [Vec<f64>; 3],
 ) -> Vec<Column> {
-    let Plant::Serial(robot) = cx.data.plant else {
+    if !cx.serial() {
         return Vec::new();
-    };
+    }
+    let robot = cx.data.plant.robot();
     let tree = crate::dynamics::Tree::new(&on_joints(robot));
     let phi = bodies(cx);
     let n = cx.data.joints();

@@ -3,7 +3,6 @@
 use super::*;
 use crate::dynamics::Tree;
 use crate::identify::robot::with_values;
-use crate::mechanism::Mechanism;
 use nalgebra::Vector3;
 
 /// Gravity direction (base tilt).
@@ -29,8 +28,8 @@ impl Effect for GravityDirection {
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        if let Some(mechanism) = cx.data.plant.mechanism() {
-            return turned(cx, mechanism).unwrap_or_default();
+        if !cx.serial() {
+            return turned(cx).unwrap_or_default();
         }
         base_compliance::tilted(cx, |r, _, _| {
             [vec![1.0; r.count], vec![0.0; r.count], vec![0.0; r.count]]
@@ -58,7 +57,7 @@ impl Effect for GravityDirection {
 
 /// Forces of a closed chain at rest under the change of gravity in base axes for tilts of the base
 /// about its `x` and `y`: `δg = −e × g₀`.
-fn turned(cx: &Context, mechanism: &Mechanism) -> Option<Vec<Column>> {
+fn turned(cx: &Context) -> Option<Vec<Column>> {
     let plant = cx.data.plant;
     let values = &cx.phi[..plant.parameters().len()];
     let bodies = with_values(plant, values).bodies;
@@ -66,7 +65,7 @@ fn turned(cx: &Context, mechanism: &Mechanism) -> Option<Vec<Column>> {
     [Vector3::x(), Vector3::y()]
         .iter()
         .map(|axis| {
-            let mut robot = mechanism.robot.clone();
+            let mut robot = plant.robot().clone();
             robot.gravity = -axis.cross(&robot.gravity);
             let tree = Tree::new(&robot);
             projected(cx, |motion| {

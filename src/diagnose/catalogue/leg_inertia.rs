@@ -1,6 +1,7 @@
 //! Legs or forearms of a parallel robot whose inertia the model leaves out.
 
 use super::*;
+use crate::mechanism::Source;
 use crate::robot::inertia::UNITS;
 
 /// Neglected leg inertia.
@@ -76,7 +77,12 @@ const REVOLUTION: [&[usize]; 4] = [&[0], &[3], &[4, 7], &[9]];
 /// count as massless.
 fn unknowns(cx: &Context) -> Vec<Unknown> {
     // the links of a general closed chain have no common axes
-    let Some(mechanism) = cx.data.plant.mechanism().filter(|m| m.kind != "loops") else {
+    let Some(mechanism) = cx
+        .data
+        .plant
+        .mechanism()
+        .filter(|m| !matches!(m.source, Source::Loops(_)))
+    else {
         return Vec::new();
     };
     let stands = |body: usize| {

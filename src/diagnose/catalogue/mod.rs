@@ -37,8 +37,8 @@ mod viscous_friction;
 use super::data::{Column, Data, averaged};
 use super::record::Record;
 use crate::dynamics::Samples;
-use crate::mechanism::ClosedMotion;
-use crate::plant::{Kind, Plant};
+use crate::mechanism::MechanismMotion;
+use crate::plant::Kind;
 use crate::robot::{JointTerm, Motion};
 use std::sync::OnceLock;
 
@@ -183,7 +183,7 @@ impl<'a> Context<'a> {
             .map(|r| r.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-9))
             .collect();
         let mut mass = Vec::new();
-        if let Plant::Serial(_) = data.plant {
+        if data.plant.mechanism().is_none() {
             for j in 0..data.joints() {
                 let more = data.torque_of(&phi, |r, _, x| {
                     x.qdd[j * r.count..(j + 1) * r.count]
@@ -344,10 +344,9 @@ impl<'a> Context<'a> {
 /// Actuator forces of a closed chain whose tree has the inertial parameters `phi` (ten a body) and
 /// nothing else, `Gᵀ Y_tree φ`; `None` for a serial robot and poses that cannot be reached.
 pub(crate) fn closed_column(cx: &Context, phi: &[f64]) -> Option<Column> {
-    let mechanism = cx.data.plant.mechanism()?;
     projected(cx, |motion| {
         let mut gamma = vec![0.0; motion.tree.dof * motion.tree.count];
-        let tree = mechanism.tree();
+        let tree = cx.data.plant.tree();
         tree.inverse_dynamics(&mut Default::default(), phi, &motion.tree, &mut gamma);
         gamma
     })
@@ -355,7 +354,10 @@ pub(crate) fn closed_column(cx: &Context, phi: &[f64]) -> Option<Column> {
 
 /// Generalised forces of the joints of the tree, record by record, as the actuators of a closed
 /// chain feel them: `Gᵀ Γ`.
-pub(crate) fn projected(cx: &Context, gamma: impl Fn(&ClosedMotion) -> Vec<f64>) -> Option<Column> {
+pub(crate) fn projected(
+    cx: &Context,
+    gamma: impl Fn(&MechanismMotion) -> Vec<f64>,
+) -> Option<Column> {
     let mechanism = cx.data.plant.mechanism()?;
     let mut rows = vec![Vec::with_capacity(cx.data.rows()); cx.data.joints()];
     for r in &cx.data.records {

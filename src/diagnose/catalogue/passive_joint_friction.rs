@@ -25,15 +25,14 @@ impl Effect for PassiveJointFriction {
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let Some(mechanism) = cx.data.plant.mechanism() else {
-            return Vec::new();
-        };
-        let passive: Vec<usize> = (0..mechanism.robot.dof())
+        let plant = cx.data.plant;
+        let names = plant.coordinate_names();
+        let passive: Vec<usize> = (0..plant.robot().dof())
             .filter(|c| {
-                let joint = &mechanism.robot.joints[*c];
-                !mechanism.actuated.contains(c)
+                let joint = &plant.robot().joints[*c];
+                !plant.actuated().contains(c)
                     && joint.motion == Motion::Revolute
-                    && !mechanism.task_names.contains(&joint.name)
+                    && !names.contains(&joint.name)
             })
             .collect();
         let friction = |law: &dyn Fn(f64, f64) -> f64| {

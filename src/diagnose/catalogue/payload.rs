@@ -1,7 +1,6 @@
 //! Payload: mass on the last link or the platform that the model does not have, `Y_n (m, m c)`.
 
 use super::*;
-use crate::simulate::effects::tool_body;
 
 /// Payload.
 pub struct Payload;
@@ -36,7 +35,7 @@ impl Effect for Payload {
     }
 
     fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let Some(body) = tool_body(cx.data.plant) else {
+        let Some(body) = cx.data.plant.tool() else {
             return Vec::new();
         };
         let count = shape[0] as usize;

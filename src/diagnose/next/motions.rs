@@ -2,7 +2,7 @@
 //! platform of a parallel one.
 
 use crate::design::diagnostic::Checker;
-use crate::design::{Settings as Design, design_plant, with_assumed_limits};
+use crate::design::{Settings as Design, design};
 use crate::diagnose::data::Data;
 use crate::plant::Plant;
 use crate::report::format::unit_of;
@@ -12,7 +12,6 @@ use crate::trajectory::{Ends, Fourier, Grid, Series, Trajectory};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use std::sync::atomic::AtomicBool;
 
 /// Periods that a motion is run.
 pub(super) const PERIODS: u32 = 3;
@@ -35,7 +34,7 @@ pub(super) struct Motions<'a> {
     plant: &'a Plant,
     /// the coordinates with their limits
     moved: Robot,
-    limits: Checker<'a>,
+    limits: Checker,
     /// lowest and highest value of each coordinate in the fitted records
     range: Vec<[f64; 2]>,
 }
@@ -43,10 +42,7 @@ pub(super) struct Motions<'a> {
 impl<'a> Motions<'a> {
     pub fn new(data: &Data<'a>) -> Self {
         let plant = data.plant;
-        let moved = match plant {
-            Plant::Serial(robot) => with_assumed_limits(robot),
-            Plant::Parallel(mechanism) => mechanism.task_robot(),
-        };
+        let moved = plant.clone().with_assumed_limits().moved().clone();
         let fitted = || data.records.iter().filter(|r| r.fit);
         let range = (0..plant.coordinates())
             .map(|k| {
@@ -57,7 +53,7 @@ impl<'a> Motions<'a> {
             })
             .collect();
         Motions {
-            limits: Checker::new(plant, &moved, 1.0),
+            limits: Checker::new(plant, 1.0),
             plant,
             moved,
             range,
@@ -79,7 +75,7 @@ impl<'a> Motions<'a> {
     fn designed(&self, seed: u64) -> Vec<(Fourier, usize)> {
         let parallel = self.plant.mechanism();
         // following loops in every step of the optimiser takes minutes
-        if parallel.is_some_and(|m| m.kind == "loops") {
+        if parallel.is_some_and(|m| matches!(m.source, crate::mechanism::Source::Loops(_))) {
             return Vec::new();
         }
         let mut all = Vec::new();
@@ -94,8 +90,7 @@ impl<'a> Motions<'a> {
                 ..Design::default()
             };
             // a robot that no motion of this period suits may have others
-            let Ok(found) = design_plant(self.plant, &wanted, &AtomicBool::new(false), &|_| {})
-            else {
+            let Ok(found) = design(self.plant, &wanted) else {
                 continue;
             };
             for factor in SLOWER {

@@ -1,11 +1,12 @@
 //! The motion against its limits: curves, certified extrema, and how much of each limit is used.
 
 use super::verdict::violations;
-use crate::identifiability::{Excitation, Platform, RATE};
+use crate::identifiability::{Excitation, Platform};
 use crate::report::format::{percent, significant, unit_of};
 use crate::report::html::{self, Section};
 use crate::report::plot::{self, Axis, Bar, Colour, Marker, Panel, Series, Shape};
 use crate::robot::{Motion, Robot};
+use crate::trajectory::RATE;
 use crate::trajectory::Space;
 use crate::trajectory::certificate::{Kind, Peak};
 use maud::{Markup, html};
@@ -64,7 +65,7 @@ pub(super) fn curves(robot: &Robot, e: &Excitation) -> Section {
             ]))
             "The percentage is the part of the limit that is used."
         }))
-        @if let Some(p) = &e.platform { p { (closed(p)) } } @else { p {
+        @if let Some(p) = &e.platform { p { (between_samples(p)) } } @else { p {
             "Extrema of position, velocity, acceleration and jerk are those of the Fourier series \
              itself, found as roots of its derivative, not the largest of some samples. Torque is \
              that of the nominal model at " (significant(RATE, 4)) " Hz in the figure; its largest \
@@ -83,8 +84,8 @@ pub(super) fn curves(robot: &Robot, e: &Excitation) -> Section {
 }
 
 /// What is proven of a closed chain, and what is stated.
-fn closed(p: &Platform) -> &'static str {
-    match (p.space, p.certificate.proven) {
+fn between_samples(p: &Platform) -> &'static str {
+    match (p.space, p.certificate.proven()) {
         (Space::Actuators, true) => {
             "These are the actuators, whose positions are the Fourier series: extrema of position, \
              velocity, acceleration and jerk are those of the series itself, found as roots of its \

@@ -2,10 +2,11 @@
 
 use super::KNOWN;
 use crate::base::{Identifiability, StandardParameter};
-use crate::identifiability::{Assessment, Excitation, Prediction, RATE};
+use crate::identifiability::{Assessment, Excitation, Prediction};
 use crate::report::format::{NBSP, count, significant, unit};
 use crate::report::html::{self, Section};
 use crate::robot::{JointTerm, Motion, inertia};
+use crate::trajectory::RATE;
 use maud::{Markup, html};
 
 /// How many will be known to [`KNOWN`] percent or better, of how many whose nominal value is not 0.

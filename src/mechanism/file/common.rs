@@ -279,7 +279,7 @@ impl Head<'_> {
         }
         setup.robot.prior = self.prior;
         let mut mechanism = Mechanism::new(setup)?;
-        mechanism.source = source.text.to_string();
+        mechanism.text = source.text.to_string();
         mechanism.robot.warnings.splice(0..0, warnings.clone());
         mechanism.warnings.splice(0..0, warnings);
         self.workspace(&mut mechanism)?;

@@ -12,7 +12,7 @@
 //! None of these tensors is formed: `Φ` along Taylor series in time with a dual part in the
 //! direction `Dw` gives the brackets as coefficients, from which the one unknown is solved.
 
-use super::closure::{Chain, Closure};
+use super::closure::Chain;
 use crate::dynamics::Samples;
 use crate::dynamics::lanes::Isa;
 use crate::mechanism::geometry::{Geometry, Segment};
@@ -31,7 +31,7 @@ const HELD: f64 = 1e-8;
 
 /// The kinematics of a tree with loops.
 #[derive(Debug)]
-pub(super) struct Closing {
+pub(super) struct LoopGeometry {
     chain: Chain,
     /// coordinates that are the task, in order
     independent: Vec<usize>,
@@ -43,7 +43,7 @@ pub(super) struct Closing {
 }
 
 /// A closed configuration with what its derivatives need.
-struct Closed {
+struct Configuration {
     q: Vec<f64>,
     /// of `J_p`
     solver: LeastSquares,
@@ -89,13 +89,13 @@ impl LeastSquares {
     }
 }
 
-impl Closing {
+impl LoopGeometry {
     pub fn new(chain: Chain, independent: Vec<usize>, home: Vec<f64>, open: f64) -> Self {
         let passive = (0..home.len())
             .filter(|i| !independent.contains(i))
             .collect();
         let tolerance = 1e-9 * chain.length + 20.0 * open;
-        Closing {
+        LoopGeometry {
             chain,
             independent,
             passive,
@@ -105,7 +105,7 @@ impl Closing {
     }
 
     /// Decomposes the closures of a configuration.
-    fn closed(&self, q: Vec<f64>) -> Result<Closed, String> {
+    fn closed(&self, q: Vec<f64>) -> Result<Configuration, String> {
         let j = self.chain.jacobian(&q);
         let (n, m) = (q.len(), self.independent.len());
         let solver = LeastSquares::new(j.select_columns(&self.passive));
@@ -129,11 +129,11 @@ impl Closing {
                 d[(i, k)] = -follow[k][row];
             }
         }
-        Ok(Closed { q, solver, d })
+        Ok(Configuration { q, solver, d })
     }
 
     /// `P b`.
-    fn passive_part(&self, at: &Closed, b: &[f64]) -> Vec<f64> {
+    fn passive_part(&self, at: &Configuration, b: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; at.q.len()];
         let p = at.solver.solve(DVector::from_column_slice(b));
         for (k, &i) in self.passive.iter().enumerate() {
@@ -144,7 +144,7 @@ impl Closing {
 
     /// From one closed configuration to that with the independent coordinates at `x`, in pieces
     /// that are short enough for the assembly mode to stay the same.
-    fn walk(&self, from: &Closed, x: &[f64]) -> Result<Closed, String> {
+    fn walk(&self, from: &Configuration, x: &[f64]) -> Result<Configuration, String> {
         let start: Vec<f64> = self.independent.iter().map(|&i| from.q[i]).collect();
         let way = DVector::from_fn(x.len(), |k, _| x[k] - start[k]);
         let mut here = self.closed(from.q.clone())?;
@@ -188,12 +188,12 @@ impl Closing {
     /// One piece: predictor along the tangent, then Newton.
     fn piece(
         &self,
-        from: &Closed,
+        from: &Configuration,
         predicted: &DVector<f64>,
         x: &[f64],
         start: &[f64],
         fraction: f64,
-    ) -> Result<Closed, String> {
+    ) -> Result<Configuration, String> {
         let mut q: Vec<f64> = (0..from.q.len())
             .map(|i| from.q[i] + predicted[i])
             .collect();
@@ -230,17 +230,17 @@ impl Closing {
         Err("Newton does not converge in 12 steps".into())
     }
 
-    fn at_home(&self) -> Result<Closed, String> {
+    fn at_home(&self) -> Result<Configuration, String> {
         self.closed(self.home.clone())
     }
 
     /// Calls `f` with the closed configuration of each sample, or with `None`.
-    fn follow(&self, x: &Samples, mut f: impl FnMut(usize, Option<&Closed>)) {
+    fn follow(&self, x: &Samples, mut f: impl FnMut(usize, Option<&Configuration>)) {
         let home = self.at_home().ok();
         let mut last = self.at_home().ok();
         for s in 0..x.count {
             let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * x.count + s]).collect();
-            let from = |start: &Option<Closed>| match start {
+            let from = |start: &Option<Configuration>| match start {
                 Some(start) if pose.iter().all(|v| v.is_finite()) => self.walk(start, &pose).ok(),
                 _ => None,
             };
@@ -254,7 +254,12 @@ impl Closing {
     }
 
     /// `q̇` and `q̈` of a closed configuration.
-    fn rates(&self, at: &Closed, xd: &DVector<f64>, xdd: &DVector<f64>) -> [DVector<f64>; 2] {
+    fn rates(
+        &self,
+        at: &Configuration,
+        xd: &DVector<f64>,
+        xdd: &DVector<f64>,
+    ) -> [DVector<f64>; 2] {
         let qd = &at.d * xd;
         let path: Vec<_> = (0..at.q.len())
             .map(|i| Taylor {
@@ -310,7 +315,7 @@ fn row(x: &[f64], m: usize, count: usize, s: usize) -> DVector<f64> {
     DVector::from_fn(m, |k, _| x[k * count + s])
 }
 
-impl Geometry for Closing {
+impl Geometry for LoopGeometry {
     fn coordinates(&self) -> usize {
         self.home.len()
     }
@@ -319,9 +324,6 @@ impl Geometry for Closing {
     }
     fn task_joints(&self) -> Option<&[usize]> {
         Some(&self.independent)
-    }
-    fn closures(&self) -> &[Closure] {
-        &self.chain.closures
     }
     fn sequential(&self) -> bool {
         true

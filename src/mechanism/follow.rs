@@ -1,9 +1,10 @@
-//! Coordinates of a parallel robot from the positions of its actuators, sample by sample.
+//! Task coordinates of a closed chain along measured motions, sample by sample: from the positions of
+//! its actuators, from their rates, or from a measured pose of the platform.
 
+use super::Mechanism;
+use super::task::{Task, from_quaternion, rpy};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
-use crate::mechanism::task::{from_quaternion, rpy};
-use crate::mechanism::{Mechanism, Task};
 use rayon::prelude::*;
 
 /// Samples between the starts of pieces that are walked on different threads.

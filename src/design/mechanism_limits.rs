@@ -41,7 +41,7 @@ struct Band {
 }
 
 /// The limits of a mechanism.
-pub(super) struct ClosedLimits<'a> {
+pub(super) struct MechanismLimits<'a> {
     mechanism: &'a Mechanism,
     bands: Vec<Band>,
     /// coordinates of the tree that are the pose, where the series are not those of the pose
@@ -53,12 +53,12 @@ pub(super) struct ClosedLimits<'a> {
     derate: f64,
 }
 
-impl<'a> ClosedLimits<'a> {
+impl<'a> MechanismLimits<'a> {
     /// Limits times `derate` (positions keep the middle of their range), at `count` samples of a
     /// period.
     pub fn new(mechanism: &'a Mechanism, derate: f64, period: f64, count: usize) -> Self {
         let mut bands = Vec::new();
-        let platform = match mechanism.geometry().platform() {
+        let platform = match mechanism.follows() {
             Some(_) => mechanism.platform_rows(),
             None => Vec::new(),
         };
@@ -105,7 +105,7 @@ impl<'a> ClosedLimits<'a> {
                 add(order, 0.0, limit);
             }
         }
-        ClosedLimits {
+        MechanismLimits {
             mechanism,
             bands,
             platform,
@@ -117,7 +117,7 @@ impl<'a> ClosedLimits<'a> {
 
     /// Value of a band at every sample; `memory` holds the motion and the forces.
     fn values(&self, band: &Band, memory: &PathMemory, out: &mut Vec<f64>) {
-        let tree = &memory.closed.motion.tree;
+        let tree = &memory.mechanism.motion.tree;
         let n = tree.count;
         let at = band.joint * n;
         out.clear();
@@ -144,14 +144,14 @@ impl<'a> ClosedLimits<'a> {
     fn evaluate(&self, motion: &Samples, memory: &mut PathMemory) -> bool {
         if self
             .mechanism
-            .evaluate_motion(&mut memory.closed, motion)
+            .evaluate_motion(&mut memory.mechanism, motion)
             .is_err()
         {
             return false;
         }
         if self.bands.iter().any(|b| b.order == 4) {
             self.mechanism
-                .smooth_force(&mut memory.closed, &mut memory.tau);
+                .smooth_force(&mut memory.mechanism, &mut memory.tau);
         }
         true
     }
@@ -162,7 +162,7 @@ impl<'a> ClosedLimits<'a> {
         match self.platform.is_empty() {
             true => (0..motion.dof).map(|k| motion.q[k * n + s]).collect(),
             false => {
-                let tree = &memory.closed.motion.tree;
+                let tree = &memory.mechanism.motion.tree;
                 self.platform.iter().map(|j| tree.q[j * n + s]).collect()
             }
         }
@@ -203,7 +203,7 @@ impl<'a> ClosedLimits<'a> {
         let dof = self.mechanism.robot.dof();
         let size = dof * m * n;
         let [mut d, mut dqd, mut dqdd] = [vec![0.0; size], vec![0.0; size], vec![0.0; size]];
-        let isa = memory.closed.tree.isa();
+        let isa = memory.mechanism.tree.isa();
         let any = |force: bool| {
             let mut all = self.bands.iter().zip(&near);
             all.any(|(b, near)| (b.order == 4) == force && !near.is_empty())
@@ -220,7 +220,7 @@ impl<'a> ClosedLimits<'a> {
                 rates[(a * na + a) * n..(a * na + a + 1) * n].fill(1.0);
             }
             let done = self.mechanism.nominal_gradients(
-                &mut memory.closed,
+                &mut memory.mechanism,
                 na,
                 motion,
                 &rates,
@@ -315,7 +315,7 @@ impl<'a> ClosedLimits<'a> {
             }
             if !self.platform.is_empty() {
                 // ∂x/∂q_a: rows of D
-                let d = &memory.closed.motion.d;
+                let d = &memory.mechanism.motion.d;
                 for slope in &mut slopes {
                     let along = |i: usize| {
                         let rows = self.platform.iter().zip(slope.iter());
@@ -391,7 +391,7 @@ fn peaks(used: &[f64], from: f64) -> Vec<(usize, f64)> {
         .collect()
 }
 
-impl PathLimits for ClosedLimits<'_> {
+impl PathLimits for MechanismLimits<'_> {
     fn used(&self, _info: &Information, motion: &Samples, memory: &mut PathMemory) -> f64 {
         if !self.evaluate(motion, memory) {
             return f64::INFINITY;

@@ -1,7 +1,8 @@
 //! Information matrix of a closed chain, `G = Bᵀ (Σ_t Yᵀ Σ⁻¹ Y) B` with `Y = Gᵀ Y_tree E`, and its
 //! adjoint products.
 
-use super::information::{Evaluation, sign_width};
+use super::memory::Evaluation;
+use super::model::{Model, sign_width};
 use crate::mechanism::{Mechanism, rounded_sign};
 use crate::robot::JointTerm;
 use faer::linalg::matmul::matmul;
@@ -9,7 +10,7 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// A parallel robot as an information matrix sees it.
 #[derive(Debug, Clone)]
-pub(super) struct ClosedModel<'a> {
+pub(super) struct MechanismModel<'a> {
     mechanism: &'a Mechanism,
     /// `E B`: raw columns × order of the matrix
     transform: Mat<f64>,
@@ -19,7 +20,7 @@ pub(super) struct ClosedModel<'a> {
     sign_width: Vec<f64>,
 }
 
-impl<'a> ClosedModel<'a> {
+impl<'a> MechanismModel<'a> {
     pub fn new(
         mechanism: &'a Mechanism,
         transform: MatRef<'_, f64>,
@@ -34,7 +35,7 @@ impl<'a> ClosedModel<'a> {
                 }
             }
         }
-        ClosedModel {
+        MechanismModel {
             mechanism,
             transform: raw,
             weights: match torque_noise {
@@ -44,14 +45,12 @@ impl<'a> ClosedModel<'a> {
             sign_width: sign_width(&mechanism.robot),
         }
     }
+}
 
-    pub fn mechanism(&self) -> &'a Mechanism {
-        self.mechanism
-    }
-
+impl Model for MechanismModel<'_> {
     /// `Σ^{-1/2} W E B` into `e.projected` and `G` into `e.gram`; zeros where the motion cannot be
     /// made.
-    pub fn evaluate(&self, e: &mut Evaluation) {
+    fn evaluate(&self, e: &mut Evaluation, _transform: MatRef<'_, f64>) {
         let (na, n) = (self.mechanism.actuators(), e.motion.count);
         let order = self.transform.ncols();
         if e.projected.nrows() != na * n || e.projected.ncols() != order {
@@ -63,7 +62,7 @@ impl<'a> ClosedModel<'a> {
         let raw = self.transform.nrows();
         let made = self
             .mechanism
-            .raw_block(&mut e.closed, &e.motion, 0, n)
+            .raw_block(&mut e.mechanism, &e.motion, 0, n)
             .map(|w| {
                 e.blocks.clear();
                 e.blocks.extend_from_slice(w);
@@ -73,7 +72,7 @@ impl<'a> ClosedModel<'a> {
             return;
         }
         let unknowns = &self.mechanism.parameters;
-        let motion = &e.closed.motion;
+        let motion = &e.mechanism.motion;
         for (t, &(joint, term)) in unknowns.terms.iter().enumerate() {
             if term != JointTerm::Coulomb {
                 continue;
@@ -103,7 +102,12 @@ impl<'a> ClosedModel<'a> {
     }
 
     /// Derivatives of `uᵀ G u` by the samples, for each column `u`, into `e.task`.
-    pub fn quadratic_gradients(&self, e: &mut Evaluation, vectors: MatRef<'_, f64>) {
+    fn quadratic_gradients<'e>(
+        &self,
+        e: &'e mut Evaluation,
+        _transform: MatRef<'_, f64>,
+        vectors: MatRef<'_, f64>,
+    ) -> [&'e [f64]; 3] {
         let (na, n, k) = (self.mechanism.actuators(), e.motion.count, vectors.ncols());
         let step = na * n;
         let phi = &self.transform * vectors;
@@ -122,10 +126,14 @@ impl<'a> ClosedModel<'a> {
         for v in 0..k {
             e.blocks.extend((0..phi.nrows()).map(|r| phi[(r, v)]));
         }
-        e.closed.sign_width.clone_from(&self.sign_width);
-        let done =
-            self.mechanism
-                .gradients(&mut e.closed, &e.blocks, &e.motion, &e.rates, &mut e.task);
+        e.mechanism.sign_width.clone_from(&self.sign_width);
+        let done = self.mechanism.gradients(
+            &mut e.mechanism,
+            &e.blocks,
+            &e.motion,
+            &e.rates,
+            &mut e.task,
+        );
         if done.is_err() {
             // the motion cannot be made: it has no gradient, and its value is infinite already
             let len = k * self.mechanism.freedoms() * n;
@@ -134,5 +142,7 @@ impl<'a> ClosedModel<'a> {
                 d.resize(len, 0.0);
             }
         }
+        let d = &e.task;
+        [&d.x, &d.xd, &d.xdd]
     }
 }

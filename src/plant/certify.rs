@@ -1,0 +1,121 @@
+//! Proof that a motion keeps all limits for all time.
+
+use super::Plant;
+use crate::error::Result;
+use crate::mechanism::MechanismCertificate;
+use crate::regressor::smooth_torque_function;
+use crate::robot::Robot;
+use crate::trajectory::Fourier;
+use crate::trajectory::certificate::{Certificate, Kind, Proof, Worst, certify};
+use crate::trajectory::torque::torque_certificate;
+
+/// Samples that the bound of the torques may spend.
+const TORQUE_SAMPLES: usize = 2000;
+
+/// What is known of all limits of a plant along a motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certified {
+    /// position, velocity, acceleration, jerk and torque of the actuators; whether every limit
+    /// holds, and the worst of all, those of the pose of a closed chain included
+    pub actuators: Certificate,
+    /// workspace box, passive joints, singularities and distances of a closed chain
+    pub mechanism: Option<MechanismCertificate>,
+    /// how the kinematic limits of the actuators are known between the samples
+    pub proof: Proof,
+}
+
+impl Certified {
+    /// Whether every limit holds for all time.
+    pub fn satisfied(&self) -> bool {
+        self.actuators.satisfied
+    }
+
+    /// The limit that is exceeded most, in words; `None` where all hold.
+    pub fn broken(&self) -> Option<String> {
+        if self.satisfied() {
+            return None;
+        }
+        Some(match &self.actuators.worst {
+            Some(w) => {
+                let what = match w.kind {
+                    Kind::Pose => w.joint.clone(),
+                    kind => format!("{} of {}", kind.name(), w.joint),
+                };
+                format!("{what} at {:.1} % of its limit", 100.0 * w.used)
+            }
+            None => "a limit that cannot be evaluated".into(),
+        })
+    }
+}
+
+impl Plant {
+    /// Judges a motion of the coordinates against all limits times `derate` (positions keep the
+    /// middle of their range; the workspace box of a closed chain is taken as it is).
+    ///
+    /// # Errors
+    /// A motion of another robot, or one that leaves the reach of a closed chain.
+    pub fn certify(&self, fourier: &Fourier, derate: f64) -> Result<Certified> {
+        let Some(mechanism) = self.mechanism() else {
+            return self.certify_tree(fourier, derate);
+        };
+        let found = mechanism.certify(fourier, derate)?;
+        Ok(Certified {
+            actuators: overall(&found),
+            proof: found.proof,
+            mechanism: Some(found),
+        })
+    }
+
+    /// Exact extrema of the series, and a bound of the torques from their curvature.
+    fn certify_tree(&self, fourier: &Fourier, derate: f64) -> Result<Certified> {
+        let derated;
+        let robot = match derate == 1.0 {
+            true => &self.robot,
+            false => {
+                derated = Robot {
+                    joints: self
+                        .robot
+                        .joints
+                        .iter()
+                        .map(|j| j.derated(derate))
+                        .collect(),
+                    ..self.robot.clone()
+                };
+                &derated
+            }
+        };
+        let kinematic = certify(robot, fourier)?;
+        let torque = smooth_torque_function(robot, &self.tree);
+        let bounds = torque_certificate(robot, fourier, TORQUE_SAMPLES, &torque)?;
+        Ok(Certified {
+            actuators: kinematic.with_torque(bounds),
+            mechanism: None,
+            proof: Proof::Exact,
+        })
+    }
+}
+
+/// The certificate of the actuators, with box and poses counted in.
+fn overall(found: &MechanismCertificate) -> Certificate {
+    let mut worst = found.actuators.worst.clone();
+    let mut offer = |other: Option<Worst>| {
+        if let Some(w) = other
+            && worst.as_ref().is_none_or(|old| w.used > old.used)
+        {
+            worst = Some(w);
+        }
+    };
+    offer(found.platform.worst.clone());
+    for p in &found.pose {
+        offer(Some(Worst {
+            joint: p.name.clone(),
+            kind: Kind::Pose,
+            used: p.used,
+        }));
+    }
+    Certificate {
+        joints: found.actuators.joints.clone(),
+        satisfied: found.satisfied,
+        worst,
+    }
+}

@@ -1,0 +1,61 @@
+//! Coordinates from what a log holds: positions and rates of the actuators, or a measured pose.
+
+use super::Plant;
+use crate::error::{Error, Result};
+use crate::mechanism::follow;
+
+pub use crate::mechanism::follow::Rates;
+
+impl Plant {
+    /// Coordinates from positions of the actuators, one list each: the same for a tree, by forward
+    /// kinematics from home for a closed chain.
+    ///
+    /// # Errors
+    /// Positions that no pose of the assembly mode gives: the sample and the actuators.
+    pub fn coordinates_of(&self, q: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+        match self.mechanism() {
+            None => Ok(q.to_vec()),
+            Some(mechanism) => Ok(lists(follow::forward(mechanism, q)?, q)),
+        }
+    }
+
+    /// Coordinates from measured pose columns `x y z qw qx qy qz`, one list each.
+    ///
+    /// # Errors
+    /// A robot without a platform, or a quaternion that is none.
+    pub fn coordinates_of_pose(&self, pose: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+        match self.mechanism() {
+            None => Err(Error::Argument(format!(
+                "{} has no platform whose pose could be measured",
+                self.name()
+            ))),
+            Some(mechanism) => Ok(lists(follow::from_pose(mechanism, pose)?, pose)),
+        }
+    }
+
+    /// Velocities of the coordinates, and accelerations where there are any, from measured ones of
+    /// the actuators along positions `x` of the coordinates: `ẋ = D_a⁺ q̇_a`.
+    ///
+    /// # Errors
+    /// A pose that cannot be reached.
+    pub fn rates_of(
+        &self,
+        x: &[Vec<f64>],
+        dq: &[Vec<f64>],
+        ddq: Option<&[Vec<f64>]>,
+    ) -> Result<Rates> {
+        match self.mechanism() {
+            None => Ok(Rates {
+                velocity: dq.to_vec(),
+                acceleration: ddq.map(<[_]>::to_vec),
+            }),
+            Some(mechanism) => follow::rates(mechanism, x, dq, ddq),
+        }
+    }
+}
+
+/// A list for each coordinate, as long as those of `like`.
+fn lists(flat: Vec<f64>, like: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let count = like.first().map_or(1, Vec::len).max(1);
+    flat.chunks_exact(count).map(<[f64]>::to_vec).collect()
+}
