@@ -437,3 +437,79 @@ fn sentences_of_the_documents_are_short() {
         assert!(mean < most, "docs/{name}: {mean:.1} words a sentence");
     }
 }
+
+/// Imports that still run against the diagram of `docs/design.md`; none may be added.
+const AGAINST: [(&str, &str); 3] = [
+    ("robot", "mechanism"),
+    ("design", "identifiability"),
+    ("mechanism", "signals"),
+];
+
+/// Every module stands in the diagram, and imports only what stands before it.
+#[test]
+fn imports_run_one_way() {
+    let text = document("design.md");
+    let diagram = section(&text, "## The house on one page")
+        .split("```")
+        .nth(1)
+        .expect("a diagram")
+        .to_string();
+    let order: Vec<&str> = diagram
+        .lines()
+        .skip(1)
+        .filter_map(|l| l.split("   ").next())
+        .flat_map(str::split_whitespace)
+        .collect();
+    let place = |name: &str| order.iter().position(|m| *m == name);
+    let mut against = BTreeSet::new();
+    for entry in std::fs::read_dir(root().join("src"))
+        .expect("src")
+        .flatten()
+    {
+        let file = entry.file_name().to_string_lossy().into_owned();
+        let module = file.trim_end_matches(".rs");
+        if ["lib", "main", "documentation"].contains(&module) {
+            continue;
+        }
+        let at = place(module)
+            .unwrap_or_else(|| panic!("{module} is not in the diagram of docs/design.md"));
+        let mut code = String::new();
+        match entry.path().is_dir() {
+            true => source(&entry.path(), &mut code),
+            false => code = std::fs::read_to_string(entry.path()).expect("read"),
+        }
+        let code: String = code
+            .lines()
+            .map(|l| l.split("//").next().unwrap_or_default())
+            .collect::<Vec<_>>()
+            .join("\n");
+        for prefix in ["crate::", "excite::"] {
+            for rest in code.split(prefix).skip(1) {
+                let names = match rest.strip_prefix('{') {
+                    Some(list) => list.split('}').next().unwrap_or_default(),
+                    None => rest
+                        .split(|c: char| !c.is_alphanumeric() && c != '_')
+                        .next()
+                        .unwrap_or_default(),
+                };
+                for name in names.split(|c: char| !c.is_alphanumeric() && c != '_') {
+                    if place(name).is_some_and(|p| p > at) {
+                        against.insert((module.to_string(), name.to_string()));
+                    }
+                }
+            }
+        }
+    }
+    for (module, imports) in &against {
+        assert!(
+            AGAINST.contains(&(module.as_str(), imports.as_str())),
+            "{module} imports {imports}, which stands after it in docs/design.md"
+        );
+    }
+    for (module, imports) in AGAINST {
+        assert!(
+            against.contains(&(module.into(), imports.into())),
+            "{module} no longer imports {imports}: take it off the list in this test"
+        );
+    }
+}
