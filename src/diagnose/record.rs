@@ -109,13 +109,13 @@ impl Record {
             found
         });
         let (dt, count, cycle) = match period {
-            Some(period) if span + 1.5 * mean >= period && period >= 4.0 * mean => {
+            Some(period)
+                if span + 1.5 * mean >= period
+                    && period >= 4.0 * mean
+                    && thinned(period, mean) >= 4 =>
+            {
                 let whole = ((span + 1.5 * mean) / period).floor().max(1.0) as usize;
-                let mut per = (period / mean).round() as usize;
-                // far above the band nothing is learnt from more samples
-                while per as f64 / period > 600.0 {
-                    per /= 2;
-                }
+                let per = thinned(period, mean);
                 (period / per as f64, whole * per, Some(per))
             }
             _ => {
@@ -193,12 +193,22 @@ impl Record {
     }
 }
 
+/// Samples of a period at intervals of `mean` or multiples of it: far above the band nothing is learnt
+/// from more of them.
+fn thinned(period: f64, mean: f64) -> usize {
+    let mut per = (period / mean).round() as usize;
+    while per as f64 / period > 600.0 {
+        per /= 2;
+    }
+    per
+}
+
 /// Whether a record repeats after `period`: at least two of them, and the positions one period
 /// apart differ by less than a thousandth of their range.
 fn repeats(raw: &Raw, mean: f64, period: f64) -> bool {
     let lag = (period / mean).round() as usize;
     let n = raw.t.len();
-    if lag == 0 || 2 * lag > n + lag / 10 {
+    if lag == 0 || lag > n || 2 * lag > n + lag / 10 {
         return false;
     }
     raw.q.iter().all(|q| {

@@ -129,7 +129,7 @@ pub fn moving(y: &[f64], step: f64) -> Vec<bool> {
     let k = ((0.025 / step) as usize).max(2);
     let n = y.len();
     let far = |i: usize| {
-        let (a, b) = (i.saturating_sub(k), (i + k).min(n - 1));
+        let (a, b) = (i.saturating_sub(k), i.saturating_add(k).min(n - 1));
         (y[b] - y[a]).abs()
     };
     let (low, high) = y

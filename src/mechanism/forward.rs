@@ -6,7 +6,7 @@
 //! sign-definite Jacobian lies a singularity), and the pose must lie where the actuators moved it to
 //! first order; where the latter fails the way is cut in halves and walked, as the robot would.
 
-use super::Mechanism;
+use super::{Mechanism, Spread};
 use crate::dynamics::{Isa, Samples};
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector};
@@ -126,6 +126,9 @@ impl Mechanism {
             .actuation_at(x.as_slice())
             .ok_or("the way leaves the reach")?;
         let solve = |j: &DMatrix<f64>, e: &DVector<f64>| {
+            if j.iter().chain(e.iter()).any(|x| !x.is_finite()) {
+                return Err("the motion is not finite there".to_string());
+            }
             j.clone()
                 .svd(true, true)
                 .solve(e, 1e-12)
@@ -172,7 +175,7 @@ impl Mechanism {
                         Err(format!(
                             "Newton stalls with an actuator off by {error:.2e}; smallest singular \
                              value of the actuation Jacobian {:.1e}",
-                            j.singular_values().min()
+                            Spread::of(&j).sigma_min
                         ))
                     };
                 }

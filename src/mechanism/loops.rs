@@ -181,6 +181,9 @@ impl Loops {
         let all: Vec<usize> = (0..home.len()).collect();
         let rank_at = |q: &[f64]| {
             let j = chain.scaled(&chain.jacobian(q));
+            if j.iter().any(|x| !x.is_finite()) {
+                return 0;
+            }
             let sv = j.singular_values();
             let top = sv.max();
             sv.iter().filter(|s| **s > RANK * top).count()
@@ -208,6 +211,11 @@ impl Loops {
     /// The first `m` actuated joints that determine the motion together.
     fn independent(&self, j: &DMatrix<f64>, m: usize) -> Result<Vec<usize>, String> {
         let n = j.ncols();
+        if j.iter().any(|x| !x.is_finite()) {
+            return Err(
+                "the closures are not finite where the joints are; check start and frames".into(),
+            );
+        }
         // rows of zeros, so that the decomposition has all of the null space
         let mut padded = DMatrix::zeros(j.nrows().max(n), n);
         padded.view_mut((0, 0), j.shape()).copy_from(j);
@@ -267,6 +275,9 @@ fn project(chain: &Chain, start: &[f64], free: &[usize]) -> Result<Vec<f64>, Str
     for _ in 0..steps {
         let j = chain.jacobian(&q).select_columns(free);
         let top = j.norm();
+        if !(top.is_finite() && r.iter().all(|x| x.is_finite())) {
+            break;
+        }
         let Ok(step) = j.svd(true, true).solve(&r, 1e-7 * top.max(1e-300)) else {
             break;
         };

@@ -104,7 +104,7 @@ pub fn derivatives(x: &[f64], period: f64, highest: usize) -> [Vec<f64>; 3] {
     let omega = 2.0 * PI / period;
     std::array::from_fn(|d| {
         let mut y = vec![[0.0; 2]; n];
-        for k in 1..n.div_ceil(2).min(highest + 1) {
+        for k in 1..n.div_ceil(2).min(highest.saturating_add(1)) {
             let w = (omega * k as f64).powi(d as i32);
             let c = full[k];
             let z = match d {

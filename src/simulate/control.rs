@@ -139,9 +139,13 @@ impl<'a> Tracker<'a> {
 /// `D_a⁻ᵀ`, or its pseudo-inverse with more actuators than freedoms (forces of least norm).
 pub(crate) fn actuation(d_a: &DMatrix<f64>) -> DMatrix<f64> {
     let top = d_a.norm();
+    let zero = || DMatrix::zeros(d_a.nrows(), d_a.ncols());
+    if !top.is_finite() {
+        return zero();
+    }
     d_a.transpose()
         .pseudo_inverse(1e-13 * top)
-        .unwrap_or_else(|_| DMatrix::zeros(d_a.nrows(), d_a.ncols()))
+        .unwrap_or_else(|_| zero())
 }
 
 /// Periodic cubic interpolation (Catmull-Rom, third order) of equidistant points of a period.

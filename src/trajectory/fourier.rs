@@ -260,10 +260,14 @@ pub(crate) fn sin_cos_turns(h: u32, turns: f64) -> (f64, f64) {
 
 /// Rate of the samples that condition numbers and predictions refer to, Hz.
 pub const RATE: f64 = 100.0;
+/// Most numbers in the regressor of one period (320 MB); a longer period is sampled more coarsely.
+const NUMBERS: usize = 40_000_000;
 
 /// One period at [`RATE`] (at least 20 samples), the end point left out.
 pub fn sample_period(fourier: &Fourier) -> crate::dynamics::Samples {
-    let count = ((fourier.period * RATE).round() as usize).clamp(20, 1_000_000);
+    // ten columns a body, as many rows a sample as joints
+    let most = (NUMBERS / (10 * fourier.dof().max(1).pow(2))).max(5000);
+    let count = ((fourier.period * RATE).round() as usize).clamp(20, most);
     fourier.motion(count)
 }
 
