@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::needless_range_loop)]
 
 pub mod compare;
+pub mod five_bar;
 pub mod noise;
 pub mod parallel;
 pub mod parallel_toml;

@@ -46,7 +46,7 @@ const COUNT: usize = 120;
 const USUAL: Duration = Duration::from_secs(40);
 
 /// Files, and the commands that read each.
-const TARGETS: [(&str, &[&str]); 14] = [
+const TARGETS: [(&str, &[&str]); 16] = [
     (
         "arm.urdf",
         &[
@@ -112,6 +112,17 @@ const TARGETS: [(&str, &[&str]); 14] = [
     (
         "hexapod.toml",
         &["identifiability hexapod.toml --output o --force"],
+    ),
+    (
+        "five.toml",
+        &[
+            "identifiability five.toml --output o --force",
+            "design five.toml --starts 1 --harmonics 2 --period 4 --time-limit 1 --rate 50 --threads 1 --output o --force",
+        ],
+    ),
+    (
+        "five_bar.urdf",
+        &["identifiability five.toml --output o --force"],
     ),
     (
         "platform.json",
@@ -191,6 +202,19 @@ jerk = 2000.0
 torque_noise = 0.1
 "#;
     std::fs::write(folder.join("arm.toml"), toml).unwrap();
+    std::fs::write(folder.join("five_bar.urdf"), crate::common::five_bar::URDF).unwrap();
+    let toml = r#"
+mechanism = "loops"
+urdf = "five_bar.urdf"
+gravity = [0, -9.81, 0]
+start = { motor_left = 2.2, elbow_left = -1.2, motor_right = 0.9, elbow_right = 1.2 }
+lock = { pin = 0.0 }
+actuated = ["motor_left", "motor_right"]
+[[loop]]
+frames = ["left_end", "right_end"]
+coincide = "position"
+"#;
+    std::fs::write(folder.join("five.toml"), toml).unwrap();
     for b in excite::mechanism::bundled::list() {
         std::fs::write(folder.join(format!("{}.toml", b.name)), b.toml).unwrap();
     }
