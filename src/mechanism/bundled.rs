@@ -5,6 +5,7 @@
 
 use super::Mechanism;
 use crate::error::Result;
+use crate::robot::bundled::PARALLEL;
 
 /// A parallel robot that comes with the program.
 #[derive(Debug, Clone, Copy)]
@@ -31,21 +32,21 @@ impl Bundled {
 
 static BUNDLED: [Bundled; 3] = [
     Bundled {
-        name: "hexapod",
+        name: PARALLEL[0],
         description: "pneumatic hexapod with a platform of 30 kg, 6 cylinders",
         source: "platform and load as in Schulte & Gerland (load identification of parallel \
                  robots); geometry, strokes, legs and friction estimated",
         toml: include_str!("bundled/hexapod.toml"),
     },
     Bundled {
-        name: "h4",
+        name: PARALLEL[1],
         description: "H4-like robot, 4 motors, x y z theta",
         source: "architecture of Pierrot & Company 1999 in the regular layout; dimensions and \
                  masses estimated, not those of the LIRMM robot",
         toml: include_str!("bundled/h4.toml"),
     },
     Bundled {
-        name: "delta",
+        name: PARALLEL[2],
         description: "Delta robot of pick-and-place size, 3 motors, x y z",
         source: "architecture of Clavel 1988; dimensions and masses estimated",
         toml: include_str!("bundled/delta.toml"),

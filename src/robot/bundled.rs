@@ -45,6 +45,10 @@ macro_rules! bundled {
     };
 }
 
+/// Names of the parallel robots that come with the program; [`mechanism`](crate::mechanism) reads
+/// them.
+pub const PARALLEL: [&str; 3] = ["hexapod", "h4", "delta"];
+
 static BUNDLED: [Bundled; 8] = [
     bundled!(
         "panda",

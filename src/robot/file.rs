@@ -7,7 +7,6 @@ mod template;
 use super::urdf::{Options, Urdf};
 use super::{Prior, Robot, bundled};
 use crate::error::{Error, Result};
-use crate::mechanism;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -84,7 +83,7 @@ impl Robot {
         if let Some(robot) = bundled::find(spec) {
             return robot.load();
         }
-        if mechanism::bundled::find(spec).is_some() {
+        if bundled::PARALLEL.contains(&spec) {
             return Err(Error::Infeasible(format!(
                 "`{spec}` is a parallel robot, and what was asked for works with serial and tree \
                  robots only"
@@ -161,8 +160,7 @@ impl Robot {
 
 /// Names of all bundled robots, parallel ones included.
 fn all_bundled() -> impl Iterator<Item = &'static str> {
-    let parallel = mechanism::bundled::list().iter().map(|b| b.name);
-    bundled::names().into_iter().chain(parallel)
+    bundled::names().into_iter().chain(bundled::PARALLEL)
 }
 
 /// The file at this path, as text.
