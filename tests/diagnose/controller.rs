@@ -63,9 +63,9 @@ fn inverse_dynamics_control_is_found_and_gives_the_motion_of_the_model() {
     let real = settings(Controller::Feedforward, 3.0, 0.1);
     let fast = motion(6, 4.0, 0.5);
     let slow = motion(6, 6.0, 0.4);
-    let raws: Vec<Raw> = [(&fast, true), (&slow, false)]
-        .map(|(m, fit)| log(&plant, m, fit, &real, NOISE).raw)
-        .into();
+    let one = |motion: &Fourier, fit: bool| log(&plant, motion, fit, &real, NOISE);
+    let (fitted, held) = (one(&fast, true), one(&slow, false));
+    let (raws, truth) = ([fitted.raw, held.raw], held.truth);
     let found = feedback(&plant, &raws).unwrap();
     let omega = TAU * 3.0;
     assert_eq!(found.kind, Kind::InverseDynamics);
@@ -80,7 +80,6 @@ fn inverse_dynamics_control_is_found_and_gives_the_motion_of_the_model() {
     assert_eq!(ki, 0.0);
 
     // the model under this controller, by the simulator; and by the diagnosis, which has only the logs
-    let truth = log(&plant, &slow, false, &real, NOISE).truth;
     let model = settings(Controller::Feedforward, 3.0, 0.0);
     let moved = log(&plant, &slow, false, &model, NOISE).truth;
     let plain = Settings {

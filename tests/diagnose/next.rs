@@ -17,7 +17,7 @@ struct Case {
     plant: Plant,
     effects: Effects,
     noise: f64,
-    runs: Vec<(Fourier, bool)>,
+    logs: Vec<Raw>,
 }
 
 impl Case {
@@ -44,21 +44,23 @@ impl Case {
         if let Some((field, text)) = effect {
             effects.set(&plant, field, text).unwrap();
         }
-        Case {
-            runs: vec![(at(1.0), true), (at(1.3), false)],
+        let mut case = Case {
             plant,
             effects,
             noise,
-        }
+            logs: Vec::new(),
+        };
+        case.record(&at(1.0), true);
+        case.record(&at(1.3), false);
+        case
     }
 
-    fn logs(&self) -> Vec<Raw> {
+    /// Simulates the robot along a motion, once, and adds its log to the records.
+    fn record(&mut self, motion: &Fourier, fit: bool) {
         let settings = rehearse::simulation(self.effects.clone());
-        let one = |(motion, fit): &(Fourier, bool)| {
-            let seed = (10.0 * motion.period) as u64;
-            without_commands(log(&self.plant, motion, *fit, &settings, self.noise, seed))
-        };
-        self.runs.iter().map(one).collect()
+        let seed = (10.0 * motion.period) as u64;
+        let seen = log(&self.plant, motion, fit, &settings, self.noise, seed);
+        self.logs.push(without_commands(seen));
     }
 
     fn diagnose(&self, next: bool, tries: usize) -> Diagnosis {
@@ -67,7 +69,7 @@ impl Case {
             next_tries: tries,
             ..Settings::default()
         };
-        of_logs(&self.plant, &self.logs(), &settings, &|_| {}).unwrap()
+        of_logs(&self.plant, &self.logs, &settings, &|_| {}).unwrap()
     }
 
     /// The proposal, checked: inside all limits, read back, and in file and report.
@@ -107,7 +109,7 @@ impl Case {
 
     /// Diagnosis with the proposed motion rehearsed and added to the records.
     fn rehearsed(&mut self, next: &Proposal) -> Diagnosis {
-        self.runs.push((next.trajectory.fourier.clone(), true));
+        self.record(&next.trajectory.fourier, true);
         self.diagnose(false, 0)
     }
 }

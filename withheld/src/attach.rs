@@ -210,7 +210,7 @@ impl Plant {
                     Vector3::new(l, 0.0, 0.0),
                     Matrix3::identity() * (0.05 * m * l * l),
                 );
-                let index = self.chain.len();
+                let index = self.chain.dof();
                 self.chain.joints.push(Joint {
                     prismatic: false,
                     rotation: rpy(FRAC_PI_2 * (1.0 + x[1]), 0.3 * x[2], 0.0),

@@ -145,7 +145,7 @@ impl Kinematics {
 }
 
 impl Chain {
-    pub fn len(&self) -> usize {
+    pub fn dof(&self) -> usize {
         self.joints.len()
     }
 
@@ -180,7 +180,7 @@ impl Chain {
 
     /// Joint torques that give the accelerations `a` (kinematics already computed).
     pub fn inverse(&self, k: &Kinematics, v: &[f64], a: &[f64], tau: &mut [f64]) {
-        let n = self.len();
+        let n = self.dof();
         let mut acc = join(Vector3::zeros(), -self.gravity);
         let mut force = Vec::with_capacity(n);
         for i in 0..n {
@@ -206,7 +206,7 @@ impl Chain {
         external: &[(usize, Vector3<f64>, Vector3<f64>)],
         a: &mut [f64],
     ) {
-        let n = self.len();
+        let n = self.dof();
         let mut inertia = k.inertia.clone();
         let mut bias: Vec<Vector6<f64>> = (0..n)
             .map(|i| cross_force(&k.velocity[i], &(k.inertia[i] * k.velocity[i])))
@@ -241,7 +241,7 @@ impl Chain {
     /// Joint torques by unit values of the ten parameters of every body: `out[j][10 i + k]`.
     pub fn regressor(&self, k: &Kinematics, v: &[f64], a: &[f64], out: &mut [Vec<f64>]) {
         let mut acc = join(Vector3::zeros(), -self.gravity);
-        for i in 0..self.len() {
+        for i in 0..self.dof() {
             acc += k.axis[i] * a[i] + cross_motion(&k.velocity[i], &(k.axis[i] * v[i]));
             for p in 0..10 {
                 let mut unit = [0.0; 10];
@@ -257,7 +257,7 @@ impl Chain {
 
     /// Diagonal of the mass matrix.
     pub fn own_inertia(&self, q: &[f64]) -> Vec<f64> {
-        let n = self.len();
+        let n = self.dof();
         let mut k = Kinematics::default();
         self.kinematics(q, &vec![0.0; n], &mut k);
         let mut sum = Matrix6::zeros();

@@ -143,8 +143,8 @@ impl Plant {
 
     /// Puts every joint on the given position and velocity; what is passive rests.
     pub fn place(&mut self, q: &[f64], v: &[f64]) {
-        self.q = vec![0.0; self.chain.len()];
-        self.v = vec![0.0; self.chain.len()];
+        self.q = vec![0.0; self.chain.dof()];
+        self.v = vec![0.0; self.chain.dof()];
         for (j, axis) in self.axes.iter_mut().enumerate() {
             self.q[self.first + j] = q[j];
             self.v[self.first + j] = v[j];
@@ -174,7 +174,7 @@ impl Plant {
 
     /// Advances one step under commanded torques and returns what the log shows of them.
     pub fn step(&mut self, command: &[f64], outer: &Disturbance, t: f64, since: f64) -> Vec<f64> {
-        let (n, total, h) = (self.axes.len(), self.chain.len(), STEP);
+        let (n, total, h) = (self.axes.len(), self.chain.dof(), STEP);
         self.chain
             .kinematics(&self.q, &self.v, &mut self.kinematics);
         let mut tau = vec![0.0; total];
