@@ -37,6 +37,7 @@ mod motion;
 mod motion_file;
 pub mod parallelogram;
 pub mod parameters;
+mod reach;
 mod regressor;
 pub mod scalar;
 mod singularity;
