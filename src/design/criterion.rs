@@ -1,23 +1,23 @@
 //! What a design minimises, and its local model for the conic subproblem.
 //!
-//! All criteria are functions of the eigenvalues `λ_1 ≥ … ≥ λ_r` of the information matrix `M`
-//! (`G`, or `G` scaled to a unit diagonal for the column-normalised condition number), taken as
+//! All criteria are functions of the eigenvalues `λ_1 ≥ … ≥ λ_r` of the information matrix `Λ_s`
+//! (`Λ`, or `Λ` scaled to a unit diagonal for the column-normalised condition number), taken as
 //! logarithms so that steps and tolerances mean the same for all of them:
 //!
 //! | criterion | `f` | minimised |
 //! |---|---|---|
 //! | condition | `½ ln(λ_1/λ_r)` | `cond(W)` |
-//! | D | `−½ ln det M / r` | volume of the confidence ellipsoid, per axis |
-//! | A | `½ ln(tr M⁻¹ / r)` | root mean square of the standard deviations |
+//! | D | `−½ ln det Λ_s / r` | volume of the confidence ellipsoid, per axis |
+//! | A | `½ ln(tr Λ_s⁻¹ / r)` | root mean square of the standard deviations |
 //! | E | `−½ ln λ_r` | longest axis of the ellipsoid |
 //!
-//! D and A are smooth where `M` is regular. `λ_1` and `λ_r` are not where eigenvalues meet, and at
+//! D and A are smooth where `Λ_s` is regular. `λ_1` and `λ_r` are not where eigenvalues meet, and at
 //! an optimum several do. There the **matrix** that the group of extreme eigenvalues lives in is
-//! linearised instead of the eigenvalue (Overton 1992): with `V` the eigenvectors of the `s`
+//! linearised instead of the eigenvalue (Overton 1992): with `U` the eigenvectors of the `s`
 //! smallest ones,
 //!
 //! ```text
-//! λ_r(x + δ) ≈ max b  subject to  Vᵀ(M + Σ_k δ_k ∂M/∂x_k) V ⪰ b 1
+//! λ_r(x + d) ≈ max b  subject to  Uᵀ(Λ_s + Σ_k d_k ∂Λ_s/∂x_k) U ⪰ b 1
 //! ```
 //!
 //! which is exact to first order whatever their multiplicity, and a semidefinite cone of order
@@ -342,7 +342,7 @@ impl Spectrum {
             .collect()
     }
 
-    /// `v_i`, or `v_i + v_j`, in the coordinates of `G`.
+    /// `v_i`, or `v_i + v_j`, in the coordinates of `Λ`.
     fn vector(&self, [i, j]: &[usize; 2]) -> Vec<f64> {
         (0..self.scale.len())
             .map(|k| {

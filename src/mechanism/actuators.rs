@@ -2,13 +2,13 @@
 //!
 //! With as many actuators as freedoms, their positions `θ = q_a` determine the mechanism as the
 //! pose `x` of its platform does, in one assembly mode: `x = X(θ)` with `F_a(X(θ)) = θ` by forward
-//! kinematics. With `A = D_a⁻¹`, `G = D A` and `P M = M − G M_a` (`M_a`: the actuated rows):
+//! kinematics. With `A = D_a⁻¹`, `G = D A` and `Ξ M = M − G M_a` (`M_a`: the actuated rows):
 //!
 //! ```text
 //! q = F(X(θ))          ẋ = A θ̇             ẍ = A (θ̈ − F_a,xx[ẋ, ẋ])
-//! ∂q/∂θ = G            ∂q̇/∂θ = P (F_xx[ẋ, ·] A)
-//! ∂(G u)/∂θ = P (F_xx[A u, ·] A)
-//! ∂q̈/∂θ = P (∂q̈/∂x A + 2 F_xx[ẋ, ·] B)     B = ∂ẋ/∂θ = −A (F_a,xx[ẋ, ·] A)
+//! ∂q/∂θ = G            ∂q̇/∂θ = Ξ (F_xx[ẋ, ·] A)
+//! ∂(G u)/∂θ = Ξ (F_xx[A u, ·] A)
+//! ∂q̈/∂θ = Ξ (∂q̈/∂x A + 2 F_xx[ẋ, ·] B)     B = ∂ẋ/∂θ = −A (F_a,xx[ẋ, ·] A)
 //! ```
 //!
 //! all exact, so that a Fourier series of the actuators is designed, judged and simulated as one of
@@ -180,7 +180,7 @@ impl ActuatorSpace {
         Ok((x, motion))
     }
 
-    /// `P M`.
+    /// `Ξ M`.
     fn project(&self, g: &DMatrix<f64>, m: DMatrix<f64>) -> DMatrix<f64> {
         let own = m.select_rows(&self.platform.actuated);
         m - g * own

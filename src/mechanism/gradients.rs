@@ -1,9 +1,9 @@
 //! Gradients of a weighted sum of actuator forces of a closed chain,
 //!
 //! ```text
-//! u = D_a⁺ r    S = rᵀ τ = (D u)ᵀ Γ
-//! dS = (D u)ᵀ dΓ + λᵀ F_xx[u, dx] + ρᵀ F_a,xx[z, dx]
-//! λ = Γ − Σ_a τ_a e_a      ρ = r − D_a u      z = D_a⁺ D_a⁺ᵀ Dᵀ Γ
+//! v = D_a⁺ u    uᵀτ = (D v)ᵀ Γ_tree
+//! d(uᵀτ) = (D v)ᵀ dΓ_tree + μᵀ F_xx[v, dx] + ρᵀ F_a,xx[z, dx]
+//! μ = Γ_tree − Σ_a τ_a e_a      ρ = u − D_a v      z = D_a⁺ D_a⁺ᵀ Dᵀ Γ_tree
 //! ```
 //!
 //! with `ρ = 0` without redundant actuators.

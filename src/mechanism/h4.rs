@@ -9,7 +9,7 @@
 //! the platform,
 //!
 //! ```text
-//! Γ = I_mot q̈ + Jᵀ M (ẍ − G) + F_v q̇ + F_s sign q̇        M = diag(M_nac, M_nac, M_nac, I_nac)
+//! Γ = I_mot q̈ + D_a⁻ᵀ M_l (ẍ − g) + F_v q̇ + F_c sign q̇        M_l = diag(M_nac, M_nac, M_nac, I_nac)
 //! ```
 //!
 //! 14 parameters: four motor inertias, `M_nac`, `I_nac`, four viscous and four Coulomb terms; with

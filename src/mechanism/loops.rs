@@ -4,8 +4,8 @@
 //! actuated joints are taken as the independent ones, `x = q_a`, and the others follow,
 //!
 //! ```text
-//! Φ(q_a, q_p) = 0     J = ∂Φ/∂q = [J_a J_p]     q̇_p = −J_p⁺ J_a q̇_a
-//! q̈_p = −J_p⁺ (J_a q̈_a + Φ_qq[q̇, q̇])           D = ∂q/∂q_a = [1; −J_p⁺ J_a]
+//! Φ(q_a, q_p) = 0     Φ_q = ∂Φ/∂q = [Φ_a Φ_p]     q̇_p = −Φ_p⁺ Φ_a q̇_a
+//! q̈_p = −Φ_p⁺ (Φ_a q̈_a + Φ_qq[q̇, q̇])           D = ∂q/∂q_a = [1; −Φ_p⁺ Φ_a]
 //! ```
 //!
 //! (Khalil & Dombre 2002, ch. 7; rows may be redundant, as those of a planar loop closed in space
@@ -13,7 +13,7 @@
 //! all orders follow from the closures by the theorem of implicit functions, exactly, with `Φ`
 //! evaluated in numbers that carry their derivatives ([`scalar`](super::scalar)).
 //!
-//! The number of freedoms is `m = n − rank J`. More actuators than freedoms are allowed (their
+//! The number of degrees of freedom is `m = n − rank Φ_q`. More actuators than degrees of freedom are allowed (their
 //! forces are then those of least norm); fewer, or actuators that leave a freedom unheld, are
 //! errors.
 
@@ -31,7 +31,7 @@ use crate::robot::{Motion, Robot};
 use closure::Chain;
 use nalgebra::{DMatrix, DVector};
 
-/// Singular values below this fraction of the largest count as zero in the rank of `J`: far above
+/// Singular values below this fraction of the largest count as zero in the rank of `Φ_q`: far above
 /// the rounding of the angles of a URDF, far below those of a mechanism that can be built.
 pub const RANK: f64 = 1e-5;
 /// A loop that stays open by more than this fraction of the characteristic length is not closed.
@@ -59,7 +59,7 @@ impl Loops {
     ///
     /// # Errors
     /// Loops that do not close (with the distance that is left), an actuator missing, actuators
-    /// that do not hold all freedoms, and what [`Mechanism::new`] finds.
+    /// that do not hold all degrees of freedom, and what [`Mechanism::new`] finds.
     pub fn build(&self) -> Result<Mechanism> {
         let (setup, warnings) = self.setup()?;
         let mut mechanism = Mechanism::new(setup)?;
@@ -147,7 +147,7 @@ impl Loops {
     }
 
     /// A closed configuration near the start: with the actuated joints where they are (with more
-    /// actuators than freedoms: as many as determine it) if that is possible, else the nearest.
+    /// actuators than degrees of freedom: as many as determine it) if that is possible, else the nearest.
     fn assemble(&self, chain: &Chain) -> Result<Vec<f64>, String> {
         let stated = self.actuated.iter().any(|&a| self.start[a] != 0.0);
         let mut first = String::new();

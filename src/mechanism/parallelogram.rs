@@ -1,19 +1,19 @@
 //! Chains of an arm and a forearm of two parallel rods: what Delta and H4 are made of.
 //!
-//! Motor `i` sits in `P_i` with the frame `R_i = [u, y, r]` (`u` motor axis, `r` direction of the arm
+//! Motor `i` sits in `a_i` with the frame `R_i = [u, y, r]` (`u` motor axis, `r` direction of the arm
 //! at zero, `y = r × u`, upwards for a horizontal axis). With arm length `L`, rod length `l` and the
-//! middle `B_i` of the rods' ends on the platform,
+//! middle `b_i` of the rods' ends on the platform,
 //!
 //! ```text
-//! d(q) = cos q r − sin q y       e = B − P       K = (|e|² + L² − l²) / 2L
-//! e·r cos q − e·y sin q = K      q = atan2(−e·y, e·r) − atan2(√(h² − K²), K)
+//! d(q) = cos q r − sin q y       e = b − a       κ = (|e|² + L² − l²) / 2L
+//! e·r cos q − e·y sin q = κ      q = atan2(−e·y, e·r) − atan2(√(ρ² − κ²), κ)
 //! ```
 //!
-//! (`h² = (e·r)² + (e·y)²`; minus: elbow outwards), reachable where `|K| ≤ h`. Both rods have the
-//! direction `b = e − L d` and the same two angles in the arm's frame `R_i Rx(q)`:
-//! `b = l (sin β, −sin γ cos β, cos γ cos β)`.
+//! (`ρ² = (e·r)² + (e·y)²`; minus: elbow outwards), reachable where `|κ| ≤ ρ`. Both rods have the
+//! direction `w = e − L d` and the same two angles in the arm's frame `R_i Rx(q)`:
+//! `w = l (sin β, −sin γ cos β, cos γ cos β)`.
 //!
-//! Bodies of a chain: arm (frame in `P_i`, `x` the motor axis, `z` along the arm) and two rods
+//! Bodies of a chain: arm (frame in `a_i`, `x` the motor axis, `z` along the arm) and two rods
 //! (frames in their joints at the arm, `z` along the rod). The platform keeps its tilt because the
 //! rods are parallel: those conditions are the [constraint block](Kinematics::constraint_block).
 
@@ -102,7 +102,7 @@ impl Parallelograms {
         self.hinges.get(chain.hinge).copied().unwrap_or_default()
     }
 
-    /// `B_i` in base axes.
+    /// `b_i` in base axes.
     fn end(&self, chain: &Chain, x: &[f64]) -> Vector3<f64> {
         let theta = x.get(3).copied().unwrap_or(0.0);
         let turn = rotation(&Vector3::new(0.0, 0.0, theta));

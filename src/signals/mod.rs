@@ -10,10 +10,10 @@
 //! mean square error of the acceleration,
 //!
 //! ```text
-//! MSE(f_c) = Σ_f [ G² S_n(f) + β (1 − G)² (S_q(f) − S_n(f)) ] ω⁴
+//! MSE(f_c) = Σ_f [ H² S_n(f) + β (1 − H)² (S_q(f) − S_n(f)) ] ω⁴
 //! ```
 //!
-//! with the gain `G` of the filter at this cut-off (`β = 100` for the Butterworth filter, whose roll-off is
+//! with the gain `H(f)` of the filter at this cut-off (`β = 100` for the Butterworth filter, whose roll-off is
 //! gradual: what it takes from the motion does not average out; 1 for whole harmonics, of which none is
 //! changed),
 //! the spectrum `S_q` of the positions and its noise floor `S_n`, from the scatter of the periods
@@ -84,7 +84,7 @@ pub struct Periods {
     /// measured positions of the actuators of each period, likewise
     pub position: Vec<Vec<f64>>,
     /// covariance of the torque noise of one period between actuators, (N m)², unfiltered:
-    /// the scatter about the mean, `1/((P−1)N) Σ_p Σ_i e_p(i) e_p(i)ᵀ`
+    /// the scatter about the mean, `1/((n_p−1)N) Σ_p Σ_i e_p(i) e_p(i)ᵀ`
     pub torque_covariance: Mat<f64>,
     /// standard deviation of the position noise of one period of each actuator
     pub position_noise: Vec<f64>,

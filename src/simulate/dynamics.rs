@@ -1,8 +1,8 @@
 //! Equations of motion in the coordinates of a plant, from the kernels of the inverse dynamics.
 //!
 //! ```text
-//! M(x) ẍ + h(x, ẋ) + Dᵀ f(q̇) = D_aᵀ τ          q̇ = D ẋ,  q̈ = D ẍ + Ḋ ẋ
-//! M = Dᵀ (M_tree + diag I_a) D      h = Dᵀ (Γ_tree(q, q̇, Ḋ ẋ) + I_a Ḋ ẋ)
+//! M(x) ẍ + b(x, ẋ) + Dᵀ f(q̇) = D_aᵀ τ          q̇ = D ẋ,  q̈ = D ẍ + Ḋ ẋ
+//! M = Dᵀ (M_tree + diag I_a) D      b = Dᵀ (Γ_tree(q, q̇, Ḋ ẋ) + I_a Ḋ ẋ)
 //! ```
 //!
 //! with `q` all joints of the tree, passive ones included, and `D = ∂q/∂x`, which is the identity

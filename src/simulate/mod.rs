@@ -2,7 +2,7 @@
 //! run before the robot is touched.
 //!
 //! ```text
-//! M(x) ẍ + h(x, ẋ) + Dᵀ f(q̇) = D_aᵀ τ(t, x, ẋ)
+//! M(x) ẍ + b(x, ẋ) + Dᵀ f(q̇) = D_aᵀ τ(t, x, ẋ)
 //! ```
 //!
 //! ([`dynamics`]) with the controller of [`control`], friction that sticks and slides ([`friction`])

@@ -1,4 +1,4 @@
-//! Information matrix of a closed chain, `G = Bᵀ (Σ_t Yᵀ Σ⁻¹ Y) B` with `Y = Gᵀ Y_tree E`, and its
+//! Information matrix of a closed chain, `Λ = Bᵀ (Σ_t Yᵀ Σ⁻¹ Y) B` with `Y = Gᵀ Y_tree E`, and its
 //! adjoint products.
 
 use super::memory::Evaluation;
@@ -48,7 +48,7 @@ impl<'a> MechanismModel<'a> {
 }
 
 impl Model for MechanismModel<'_> {
-    /// `Σ^{-1/2} W E B` into `e.projected` and `G` into `e.gram`; zeros where the motion cannot be
+    /// `Σ^{-1/2} W E B` into `e.projected` and `Λ` into `e.gram`; zeros where the motion cannot be
     /// made.
     fn evaluate(&self, e: &mut Evaluation, _transform: MatRef<'_, f64>) {
         let (na, n) = (self.mechanism.actuators(), e.motion.count);
@@ -101,7 +101,7 @@ impl Model for MechanismModel<'_> {
         matmul(gram, Accum::Replace, a.transpose(), a, 1.0, Par::Seq);
     }
 
-    /// Derivatives of `uᵀ G u` by the samples, for each column `u`, into `e.task`.
+    /// Derivatives of `uᵀ Λ u` by the samples, for each column `u`, into `e.task`.
     fn quadratic_gradients<'e>(
         &self,
         e: &'e mut Evaluation,

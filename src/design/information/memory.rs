@@ -9,7 +9,7 @@ use faer::Mat;
 pub struct Evaluation {
     /// the motion at the samples
     pub motion: Samples,
-    /// `G`, lower triangle and upper
+    /// `Λ`, lower triangle and upper
     pub gram: Mat<f64>,
     pub(super) ws: Workspace,
     pub(super) blocks: Vec<f64>,

@@ -1,7 +1,7 @@
 //! The information matrix of a trajectory and its exact derivatives.
 //!
 //! ```text
-//! G(x) = Σ_t Bᵀ Y(t)ᵀ Σ⁻¹ Y(t) B        (r × r)
+//! Λ(x) = Σ_t Bᵀ Y(t)ᵀ Σ⁻¹ Y(t) B        (r × r)
 //! ```
 //!
 //! over `N` uniform samples of one period, with `B` (`p × r`) choosing the coordinates in which
@@ -16,7 +16,7 @@
 //! ∂(uᵀG u)/∂x = 2 Σ_t (∂(Y B u)/∂x)ᵀ Σ⁻¹ Y B u
 //! ```
 //!
-//! so the derivative of any spectral function of `G` costs a few inverse dynamics.
+//! so the derivative of any spectral function of `Λ` costs a few inverse dynamics.
 
 mod mechanism;
 mod memory;
@@ -107,7 +107,7 @@ impl<'a> Information<'a> {
         self.count
     }
 
-    /// Order of `G`.
+    /// Order of `Λ`.
     pub fn order(&self) -> usize {
         self.transform.ncols()
     }
@@ -143,8 +143,8 @@ impl<'a> Information<'a> {
         }
     }
 
-    /// Evaluates the motion, the regressor and `G`; a motion that a closed chain cannot make gives
-    /// a `G` of zeros.
+    /// Evaluates the motion, the regressor and `Λ`; a motion that a closed chain cannot make gives
+    /// a `Λ` of zeros.
     pub fn evaluate(&self, x: &[f64], e: &mut Evaluation) {
         self.sample(x, &mut e.motion);
         self.model.evaluate(e, self.transform.as_ref());

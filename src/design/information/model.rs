@@ -6,10 +6,10 @@ use faer::MatRef;
 
 /// Regressor and adjoint products of a robot, `transform` being `B`.
 pub(super) trait Model: std::fmt::Debug + Send + Sync {
-    /// `G` of the motion in the memory; zeros where the robot cannot make it.
+    /// `Λ` of the motion in the memory; zeros where the robot cannot make it.
     fn evaluate(&self, e: &mut Evaluation, transform: MatRef<'_, f64>);
 
-    /// Derivatives of `uᵀ G u` by positions, velocities and accelerations of the coordinates at the
+    /// Derivatives of `uᵀ Λ u` by positions, velocities and accelerations of the coordinates at the
     /// samples, for each column `u`: vector `v`, coordinate `k`, sample `s` at
     /// `(v·coordinates + k)·count + s`. Needs [`Model::evaluate`] at the same point before.
     fn quadratic_gradients<'e>(

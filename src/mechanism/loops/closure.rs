@@ -181,7 +181,7 @@ impl Chain {
         DVector::from_iterator(self.rows(), self.residual(&q).into_iter().map(|x| x.0))
     }
 
-    /// `J = ∂Φ/∂q`.
+    /// `Φ_q = ∂Φ/∂q`.
     pub fn jacobian(&self, q: &[f64]) -> DMatrix<f64> {
         const AT_ONCE: usize = 4;
         let mut j = DMatrix::zeros(self.rows(), q.len());
@@ -204,7 +204,7 @@ impl Chain {
         j
     }
 
-    /// `J` without dimension: rows in characteristic lengths, columns in radians or characteristic
+    /// `Φ_q` without dimension: rows in characteristic lengths, columns in radians or characteristic
     /// lengths.
     pub fn scaled(&self, j: &DMatrix<f64>) -> DMatrix<f64> {
         let mut scaled = j / self.length;

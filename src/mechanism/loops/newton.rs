@@ -1,11 +1,11 @@
 //! Kinematics of closed loops: Newton on the closures, implicit differentiation.
 //!
-//! With `D = ∂q/∂x` and `P` the map `b ↦ (0, −J_p⁺ b)`, the second and third derivatives of the
+//! With `D = ∂q/∂x` and `Ψ` the map `b ↦ (0, −Φ_p⁺ b)`, the second and third derivatives of the
 //! configuration are those that keep `Φ` zero:
 //!
 //! ```text
-//! F_xx[u, v]    = P Φ_qq[Du, Dv]
-//! F_xxx[u,u,w]  = P ( Φ_qqq[Du,Du,Dw] + 2 Φ_qq[F_xx[u,w], Du] + Φ_qq[F_xx[u,u], Dw] )
+//! F_xx[u, v]    = Ψ Φ_qq[Du, Dv]
+//! F_xxx[u,u,w]  = Ψ ( Φ_qqq[Du,Du,Dw] + 2 Φ_qq[F_xx[u,w], Du] + Φ_qq[F_xx[u,u], Dw] )
 //! ∂q̇/∂x w = F_xx[ẋ, w]      ∂q̈/∂x w = F_xx[ẍ, w] + F_xxx[ẋ, ẋ, w]
 //! ```
 //!
@@ -26,7 +26,7 @@ type Number = Pack<f64>;
 const PIECE: f64 = 0.25;
 /// Most pieces between two samples.
 const PIECES: f64 = 4096.0;
-/// Relative pivot of `J_p` at which the way ends.
+/// Relative pivot of `Φ_p` at which the way ends.
 const HELD: f64 = 1e-8;
 
 /// The kinematics of a tree with loops.
@@ -45,13 +45,13 @@ pub(super) struct LoopGeometry {
 /// A closed configuration with what its derivatives need.
 struct Configuration {
     q: Vec<f64>,
-    /// of `J_p`
+    /// of `Φ_p`
     solver: LeastSquares,
     /// `D`, coordinates × task
     d: DMatrix<f64>,
 }
 
-/// `J_p⁺` by orthogonal triangularisation with column pivots. (The singular values of nalgebra are
+/// `Φ_p⁺` by orthogonal triangularisation with column pivots. (The singular values of nalgebra are
 /// good to 1e-8 only, which is enough to measure with but not to move with.)
 struct LeastSquares {
     q: DMatrix<f64>,
@@ -132,7 +132,7 @@ impl LoopGeometry {
         Ok(Configuration { q, solver, d })
     }
 
-    /// `P b`.
+    /// `Ψ b`.
     fn passive_part(&self, at: &Configuration, b: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; at.q.len()];
         let p = at.solver.solve(DVector::from_column_slice(b));
@@ -296,7 +296,7 @@ impl LoopGeometry {
         all.iter().map(|r| r.d[0].d[0].0).collect()
     }
 
-    /// `J_p` without dimension.
+    /// `Φ_p` without dimension.
     fn block(&self, q: &[f64]) -> DMatrix<f64> {
         let j = self.chain.scaled(&self.chain.jacobian(q));
         j.select_columns(&self.passive)
