@@ -8,9 +8,18 @@
 //! ```
 //!
 //! so exactly the `b` combinations `π_b` can be identified (Gautier 1991; Mayeda, Yoshida & Osuka
-//! 1990). `W` is evaluated at random states inside the limits with columns scaled to unit length,
-//! so that units do not decide; the rank comes from its singular values, see
-//! [`BaseParameters::rank_gap`].
+//! 1990). `W` is evaluated at random states.
+//!
+//! **The rank** `b` is counted on the singular values of `W` as it is, in kg, m and rad. Columns
+//! scaled to unit length would hide the border: a column that is almost nothing becomes as large
+//! as the others. The geometry is the one that the file means, without the rounding of its digits
+//! ([`meant`](crate::robot::meant)), and the states are inside the limits of position and equally
+//! fast for all joints, so that no limit decides. What is left is a plain gap: values that count
+//! may fall smoothly to 1e-7 of the largest (fingers that follow one motor), the others are
+//! rounding of the arithmetic, 1e-15. The border is the first gap of a factor [`CLEAR`] that ends
+//! below [`NEGLIGIBLE`] of the largest. Both sides of it are kept
+//! ([`singular_value_above`](BaseParameters::singular_value_above) and
+//! [`singular_value_below`](BaseParameters::singular_value_below)).
 //!
 //! **Which columns are kept.** Norms of dependent columns tie exactly (`Ixx` and `-Iyy` of a link
 //! that turns about `z`, a mass and the first moments of its parent, …), so a pivoted QR would
@@ -32,14 +41,21 @@ use faer::{Mat, MatRef};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Singular values below this fraction of the largest are zero, unless a wider gap lies elsewhere
-/// in [`TOLERANCE_WINDOW`].
+/// Factor between two neighbouring singular values that makes a border of the rank.
+pub const CLEAR: f64 = 1e3;
+
+/// Largest singular value below the border, relative to the largest of all: what is more is never
+/// dropped at the first gap.
+pub const NEGLIGIBLE: f64 = 1e-6;
+
+/// Rounding of the arithmetic, relative to the largest singular value.
+const ROUNDING: f64 = 1e-15;
+
+/// Residual of a unit column that counts, unless a wider gap lies elsewhere in [`WINDOW`].
 const TOLERANCE: f64 = 3e-5;
 
-/// Where the border between rank and rounding is looked for, relative to the largest singular
-/// value. Machine precision gives a gap of 1e10 and more below `1e-8`; right angles rounded to
-/// four decimals leave spurious values up to about 1e-5.
-pub const TOLERANCE_WINDOW: [f64; 2] = [1e-6, 1e-3];
+/// Where the residual of a unit column that counts is first looked for.
+const WINDOW: [f64; 2] = [1e-6, 1e-3];
 
 /// What can be said about one standard parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -80,10 +96,13 @@ pub struct BaseParameters {
     /// orthonormal basis `V` (`p × b`) of the row space of `W`: `W V` has the non-zero singular
     /// values of `W`
     pub row_space: Mat<f64>,
-    /// singular values of the scaled `W` over random states, largest first, relative to the largest
+    /// singular values of `W` over random states, largest first, relative to the largest
     pub singular_values: Vec<f64>,
-    /// smallest singular value that counts over the largest that does not (or over the rounding of
-    /// the largest of all, where that is more)
+    /// the smallest of them that counts
+    pub singular_value_above: f64,
+    /// the largest that does not count; 0 where all count
+    pub singular_value_below: f64,
+    /// the former over the latter (or over the rounding of the largest of all, where that is more)
     pub rank_gap: f64,
     /// every standard parameter with its class and reason
     pub standard: Vec<StandardParameter>,
@@ -129,11 +148,14 @@ impl BaseParameters {
     /// # Errors
     /// When the decomposition fails, which needs numbers that are not finite.
     pub fn new(robot: &Robot) -> Result<Self> {
+        let meant = robot.as_meant();
+        let robot = meant.as_ref().unwrap_or(robot);
         let tree = Tree::new(robot);
         let p = robot.parameter_count();
         let count = (3 * p / robot.dof().max(1)).max(60);
-        let states = random_states(robot, count, 0x0e_4c17e);
-        let w = Regressor::with_tree(robot, &tree, &states);
+        let states = |robot: &Robot| random_states(robot, count, 0x0e_4c17e);
+        let w = Regressor::with_tree(robot, &tree, &states(robot));
+        let even = Regressor::with_tree(robot, &tree, &states(&equally_fast(robot)));
         let mut base = Self::of(
             robot
                 .columns()
@@ -146,6 +168,7 @@ impl BaseParameters {
                 .map(|c| robot.column_unit(*c))
                 .collect(),
             w.mat(),
+            even.mat(),
             &[],
         )?;
         for (k, column) in robot.columns().into_iter().enumerate() {
@@ -164,13 +187,15 @@ impl BaseParameters {
         units: Vec<&'static str>,
         w: MatRef<'_, f64>,
     ) -> Result<Self> {
-        Self::of(names, units, w, &PASSES)
+        Self::of(names, units, w, w, &PASSES)
     }
 
+    /// Columns are chosen on `w`, the rank is counted on `even`.
     fn of(
         names: Vec<String>,
         units: Vec<&'static str>,
         w: MatRef<'_, f64>,
+        even: MatRef<'_, f64>,
         passes: &[f64],
     ) -> Result<Self> {
         let p = w.ncols();
@@ -193,33 +218,38 @@ impl BaseParameters {
         let scaled = Mat::from_fn(w.nrows(), live.len(), |i, j| {
             w[(i, live[j])] / norms[live[j]]
         });
-        // R of a plain QR has the singular values of the whole and is small
-        let r = scaled.qr().thin_R().to_owned();
-        let sv = r
-            .singular_values()
-            .map_err(|_| Error::Infeasible("singular values did not converge".into()))?;
-        let top = sv.first().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
-        let sv: Vec<f64> = sv.iter().map(|s| s / top).collect();
-        let (rank, tolerance) = rank(&sv);
+        let sv = relative_singular_values(even)?;
+        let rank = rank(&sv);
+        let above = rank.checked_sub(1).map_or(1.0, |k| sv[k]);
+        let below = sv.get(rank).copied().unwrap_or(0.0);
         // what is below the rounding of the largest is rounding
-        let below = sv.get(rank).copied().unwrap_or(0.0).max(f64::EPSILON);
-        let rank_gap = rank.checked_sub(1).map_or(1.0, |k| sv[k] / below);
+        let rank_gap = above / below.max(f64::EPSILON);
         let mut warnings = Vec::new();
-        if rank_gap < 1e3 {
+        if rank_gap < CLEAR {
             warnings.push(Warning::new(
                 WarningKind::RankGap,
                 "rank",
                 format!(
                     "the border between identifiable and not is blurred: singular value {rank} is \
-                     {:.1e} and the next {:.1e} of the largest; look for nearly aligned axes or \
-                     rounded angles",
-                    sv[rank - 1],
-                    sv.get(rank).copied().unwrap_or(0.0)
+                     {above:.1e} and the next {below:.1e} of the largest; look for nearly aligned \
+                     axes or rounded lengths and angles, and write all their digits",
                 ),
             ));
         }
 
+        let r = scaled.qr().thin_R().to_owned();
+        let tolerance = tolerance(&relative_singular_values(r.as_ref())?, rank);
         let (kept, k) = keep(&r, rank, tolerance, passes);
+        if kept.len() != rank {
+            warnings.push(Warning::new(
+                "rank",
+                format!(
+                    "{rank} parameters are independent, and only {} columns could be told to be; \
+                     scale the file to metres and kilograms",
+                    kept.len()
+                ),
+            ));
+        }
         let kept_columns: Vec<usize> = kept.iter().map(|&j| live[j]).collect();
         let dropped: Vec<usize> = (0..p).filter(|j| !kept_columns.contains(j)).collect();
         // back to unscaled columns: K_unscaled = D_b⁻¹ K D_d
@@ -258,6 +288,8 @@ impl BaseParameters {
             k,
             row_space,
             singular_values: sv,
+            singular_value_above: above,
+            singular_value_below: below,
             rank_gap,
             standard,
             warnings,
@@ -455,10 +487,44 @@ fn none_reason(robot: &Robot, body: usize, k: usize) -> String {
     String::new()
 }
 
-/// Rank from relative singular values (descending) and the tolerance that it stands for: the
-/// widest gap whose border lies inside [`TOLERANCE_WINDOW`].
-fn rank(sv: &[f64]) -> (usize, f64) {
-    let [low, high] = TOLERANCE_WINDOW;
+/// The same robot with equal limits of velocity and acceleration for all joints.
+fn equally_fast(robot: &Robot) -> Robot {
+    let mut robot = robot.clone();
+    for joint in &mut robot.joints {
+        joint.limits.velocity = f64::INFINITY;
+        joint.limits.acceleration = f64::INFINITY;
+    }
+    robot
+}
+
+/// Singular values, largest first, relative to the largest.
+fn relative_singular_values(m: MatRef<'_, f64>) -> Result<Vec<f64>> {
+    // R of a plain QR has the singular values of the whole and is small
+    let r = m.qr().thin_R().to_owned();
+    let sv = r
+        .singular_values()
+        .map_err(|_| Error::Infeasible("singular values did not converge".into()))?;
+    let top = sv.first().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    Ok(sv.iter().map(|s| s / top).collect())
+}
+
+/// Rank from relative singular values (descending): the first gap of [`CLEAR`] that ends below
+/// [`NEGLIGIBLE`]; where there is none, the widest.
+fn rank(sv: &[f64]) -> usize {
+    let below = |r: usize| sv.get(r).copied().unwrap_or(0.0).max(ROUNDING);
+    let gap = |r: usize| sv[r - 1] / below(r);
+    let counted = sv.iter().take_while(|s| **s > ROUNDING).count();
+    (1..=counted)
+        .find(|&r| below(r) <= NEGLIGIBLE && gap(r) >= CLEAR)
+        .or_else(|| (1..=counted).max_by(|&a, &b| gap(a).total_cmp(&gap(b))))
+        .unwrap_or(0)
+}
+
+/// Residual that a unit column must leave to count: the widest gap of the singular values of the
+/// unit columns (relative, descending) whose border lies inside [`WINDOW`]; where that contradicts
+/// the rank, the middle of the border of the rank.
+fn tolerance(sv: &[f64], rank: usize) -> f64 {
+    let [low, high] = WINDOW;
     let mut best = (0.0, 0, TOLERANCE);
     for r in 1..=sv.len() {
         let above = sv[r - 1].min(high);
@@ -468,7 +534,13 @@ fn rank(sv: &[f64]) -> (usize, f64) {
             best = (gap, r, (above * below).sqrt());
         }
     }
-    (best.1, best.2)
+    match rank.checked_sub(1).and_then(|k| sv.get(k)) {
+        Some(above) if best.1 != rank => {
+            let below = sv.get(rank).copied().unwrap_or(0.0).max(ROUNDING);
+            (above.max(ROUNDING) * below).sqrt()
+        }
+        _ => best.2,
+    }
 }
 
 /// Residuals (of unit columns) that closed chains ask of a column, one pass over the columns each:
@@ -560,11 +632,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rank_ignores_rounded_angles_and_keeps_weak_parameters() {
-        assert_eq!(rank(&[1.0, 0.1, 2e-3, 4e-6, 1e-16]).0, 3);
-        assert_eq!(rank(&[1.0, 0.1, 2e-3, 1e-16]).0, 3);
-        assert_eq!(rank(&[1.0, 1e-4, 1e-15]).0, 2);
-        assert_eq!(rank(&[1.0, 0.5]).0, 2);
+    fn the_rank_ends_at_a_clear_gap() {
+        assert_eq!(rank(&[1.0, 0.1, 2e-3, 1e-16]), 3);
+        assert_eq!(rank(&[1.0, 1e-4, 1e-15]), 2);
+        assert_eq!(rank(&[1.0, 0.5]), 2);
+        assert_eq!(rank(&[]), 0);
+        // two parameters that exist by rounding
+        assert_eq!(rank(&[1.0, 6e-2, 4e-7, 3e-8, 1e-16]), 2);
+        // small, but no border before the rounding of the arithmetic
+        let smooth: Vec<f64> = (0..30).map(|k| 0.55f64.powi(k)).collect();
+        let all = [&smooth[..], &[2e-16, 1e-16]].concat();
+        assert_eq!(rank(&all), 30);
+        // a slow joint beside fast ones
+        assert_eq!(rank(&[1.0, 0.5, 3e-4, 1e-4, 1e-15]), 4);
     }
 
     #[test]

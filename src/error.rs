@@ -106,6 +106,8 @@ warning_kinds! {
     EntryIgnored = "entry_ignored",
     /// A joint follows one that does not move it, and is held fixed.
     JointHeld = "joint_held",
+    /// An angle is written with few digits; it counts as a right angle where identifiability is decided.
+    AngleRounded = "angle_rounded",
     /// A friction or drive term is negative; it is kept as written.
     NegativeParameter = "negative_parameter",
     /// A link has no mass or no inertia; it is taken as zero or as a point mass.

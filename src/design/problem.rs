@@ -190,11 +190,12 @@ impl Problem<'_> {
         match broken.is_empty() {
             false => format!(
                 "{}: no feasible trajectory: at rest in the middle of its range {broken}; check \
-                 masses, gravity, the limit, or choose a start posture",
+                 masses, gravity and the limits, or choose a start posture",
                 self.plant.name()
             ),
             true => format!(
-                "{}: no feasible trajectory was found; check the limits and the start posture",
+                "{}: no trajectory that keeps the limits was found to excite every parameter; \
+                 check masses, inertias, the limits and the start posture",
                 self.plant.name()
             ),
         }

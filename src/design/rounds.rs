@@ -49,6 +49,10 @@ impl Search {
                 };
                 let Some(x) = x else { return Ok(None) };
                 let mut it = Iterate::new(task, x);
+                if !it.value.is_finite() {
+                    // as good as standing still: nothing to improve on
+                    return Ok(None);
+                }
                 let stop = Stop {
                     iterations: 120,
                     gain: 1e-2,

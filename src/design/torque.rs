@@ -7,7 +7,7 @@
 use super::information::{Evaluation, Information};
 use super::path::{PathLimits, PathMemory, PathRow, ROOM};
 use crate::dynamics::{Derivatives, Samples, Workspace};
-use crate::robot::{JointTerm, Robot};
+use crate::robot::{JointTerm, Motion, Robot};
 
 /// Torque limits of a robot.
 #[derive(Debug, Clone)]
@@ -17,6 +17,67 @@ pub struct TorqueLimits {
     names: Vec<String>,
     /// limit less Coulomb friction, per joint
     room: Vec<f64>,
+    /// what to do about a joint that cannot keep its limit
+    remedies: Vec<String>,
+}
+
+/// What to do about joint `j` where its limit cannot be kept: friction that joints which mimic it
+/// add, and the line that holds it.
+fn remedy(robot: &Robot, j: usize, derate: f64) -> String {
+    let joint = &robot.joints[j];
+    let unit = match joint.motion {
+        Motion::Revolute => "N m",
+        Motion::Prismatic => "N",
+    };
+    let coulomb = joint.terms[JointTerm::Coulomb as usize].abs();
+    let followers: Vec<&str> = robot
+        .bodies
+        .iter()
+        .filter(|b| b.coordinate == j && b.joint_name != joint.name)
+        .map(|b| b.joint_name.as_str())
+        .collect();
+    let mut text = String::new();
+    if coulomb > 0.0 {
+        text = format!(
+            " (friction {} {unit}{}, limit {} {unit} times derate {derate})",
+            short(coulomb),
+            match followers.is_empty() {
+                true => String::new(),
+                false => format!(
+                    ", that of {} joints which mimic it included, {} first",
+                    followers.len(),
+                    followers[0]
+                ),
+            },
+            short(joint.limits.effort)
+        );
+    }
+    let [low, high] = joint.limits.position;
+    let middle = 0.5 * (low + high);
+    let hold = if middle.is_finite() { middle } else { 0.0 };
+    text + &format!(
+        "; correct the effort limit or <dynamics friction>, or hold the joint: write \
+         `lock = {{ {} = {} }}` at the top of robot.toml",
+        toml_key(&joint.name),
+        short(hold)
+    )
+}
+
+/// A number that people read and TOML takes.
+fn short(x: f64) -> String {
+    match x == 0.0 || (1e-3..1e6).contains(&x.abs()) {
+        true => format!("{}", (1e4 * x).round() / 1e4),
+        false => format!("{x:.2e}"),
+    }
+}
+
+/// A name as a key of TOML: bare where it can be.
+fn toml_key(name: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match !name.is_empty() && name.chars().all(bare) {
+        true => name.to_string(),
+        false => format!("{name:?}"),
+    }
 }
 
 /// Room kept at the samples for what happens between them, as a fraction of the limit.
@@ -32,6 +93,7 @@ impl TorqueLimits {
             phi: robot.bodies.iter().flat_map(|b| b.inertia.0).collect(),
             terms: robot.joints.iter().map(|j| j.terms).collect(),
             names: robot.joint_names(),
+            remedies: (0..robot.dof()).map(|j| remedy(robot, j, derate)).collect(),
             room: robot
                 .joints
                 .iter()
@@ -95,11 +157,15 @@ impl PathLimits for TorqueLimits {
         let mut tau = Vec::new();
         self.torques(info, motion, &mut Workspace::default(), &mut tau);
         let (used, j) = self.worst(&tau);
+        let (name, remedy) = (&self.names[j], &self.remedies[j]);
         match used > 1.0 {
+            true if used.is_infinite() => format!(
+                "{name} has nothing left of its effort limit: its Coulomb friction alone is \
+                 more{remedy}"
+            ),
             true => format!(
-                "{} already needs {:.0} % of its effort limit",
-                self.names[j],
-                100.0 * used
+                "{name} already needs {} % of its effort limit{remedy}",
+                short(100.0 * used)
             ),
             false => String::new(),
         }

@@ -146,6 +146,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         .collect();
     let mut out = json!({
         "robot": d.robot,
+        "joints": d.joints,
         "verdict": d.verdict,
         "gap": {
             "rms": number(total),

@@ -5,6 +5,7 @@ use super::next::Proposal;
 use super::{Diagnosis, Finding, Verdict};
 use crate::report::format::{percent, significant};
 use crate::report::html::{Section, Tone, details, figure, legend, page, table, tiles};
+use crate::report::joints;
 use crate::report::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape};
 use maud::{Markup, html};
 
@@ -86,6 +87,7 @@ pub fn html(d: &Diagnosis) -> String {
         Section::new("As the simulator's user sees it", simulated(d)),
         Section::new("What to run next", next(d)),
         Section::new("What this data cannot say", limits(d)),
+        joints::order(d.joints.iter().map(String::as_str)),
     ];
     page(
         &format!("{}: diagnosis", d.robot),

@@ -46,6 +46,13 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
     put("base_parameters", json!(a.base.count()));
     put("rank_gap", number(a.base.rank_gap));
     put(
+        "rank_border",
+        json!({
+            "above": number(a.base.singular_value_above),
+            "below": number(a.base.singular_value_below),
+        }),
+    );
+    put(
         "condition_number",
         e.map_or(Value::Null, |e| {
             json!({

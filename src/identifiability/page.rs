@@ -15,6 +15,7 @@ use crate::design::record::Record;
 use crate::identifiability::Assessment;
 use crate::report::format::{count, percent, significant, with_unit};
 use crate::report::html::{self, Section, Tone};
+use crate::report::joints;
 use maud::{Markup, html};
 
 /// A parameter counts as known from this relative standard deviation downwards, percent.
@@ -63,6 +64,7 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
     sections.push(spectrum::section(assessment));
     sections.extend(record.map(spectrum::history));
     sections.push(parameters::classes(assessment));
+    sections.push(joints::order(robot.joints.iter().map(|j| j.name.as_str())));
     sections.push(reproduce::section(assessment, record));
     html::page(
         &format!("{subject}: {}", robot.name),

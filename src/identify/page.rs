@@ -6,6 +6,7 @@ use crate::log::Purpose;
 use crate::plant::{Kind, Plant};
 use crate::report::format::{NBSP, percent, significant, unit, with_unit};
 use crate::report::html::{self, Section, Tone};
+use crate::report::joints;
 use crate::report::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape, time_series};
 use crate::robot::Motion;
 use crate::signals::fourier::welch;
@@ -79,6 +80,7 @@ pub fn html(plant: &Plant, id: &Identification, settings: &Settings) -> String {
         essential(id),
         prior(id, settings),
         signals(id),
+        joints::order(plant.actuators().iter().map(|j| j.name.as_str())),
     ];
     if !id.warnings.is_empty() {
         let list = html! { ul { @for w in &id.warnings { li { strong { (w.subject) } ": " (w.message) } } } };

@@ -46,6 +46,7 @@ pub fn json(found: &Identified) -> Value {
     out["method"] = json!(name(found.method));
     out["frame"] = json!(found.frame);
     out["robot"] = json!(found.robot);
+    out["joints"] = json!(found.joints);
     out["condition_number"] = json!(one.condition.min(1e300));
     out["methods"] = json!({ "one_step": body(&one.load) });
     if let Some(two) = &found.two_step {

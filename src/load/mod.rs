@@ -117,6 +117,8 @@ pub struct Loaded {
 pub struct Identified {
     /// robot
     pub robot: String,
+    /// its actuators, in the order of the log columns
+    pub joints: Vec<String>,
     /// link or platform in whose frame the load is given
     pub frame: String,
     /// all parameters at once
@@ -265,6 +267,7 @@ pub fn from_records(
     };
     Ok(Identified {
         robot: plant.name().into(),
+        joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
         frame: plant.robot().bodies[tool].name.clone(),
         one_step,
         two_step,

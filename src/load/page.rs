@@ -5,6 +5,7 @@ use super::body::LoadBody;
 use super::json::known;
 use crate::report::format::{percent, significant, with_unit};
 use crate::report::html::{self, Section, Tone};
+use crate::report::joints;
 use crate::report::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape, time_series};
 use maud::{Markup, html};
 
@@ -98,6 +99,7 @@ pub fn html(found: &Identified) -> String {
             },
         ));
     }
+    sections.push(joints::order(found.joints.iter().map(String::as_str)));
     let records: Vec<&str> = found
         .one_step
         .records

@@ -76,6 +76,7 @@ impl Builder {
             coordinate,
             ratio: 1.0,
             offset: 0.0,
+            meant: None,
         });
         self.bodies.len() - 1
     }

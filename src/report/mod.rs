@@ -6,4 +6,5 @@
 
 pub mod format;
 pub mod html;
+pub mod joints;
 pub mod plot;

@@ -9,10 +9,12 @@ mod assumed;
 pub mod bundled;
 pub mod file;
 pub mod inertia;
+pub mod meant;
 mod parameter;
 pub mod urdf;
 
 pub use inertia::Inertia;
+pub use meant::Placement;
 pub use parameter::{Column, Parameter};
 
 use crate::error::Warning;
@@ -58,6 +60,9 @@ pub struct Body {
     pub ratio: f64,
     /// joint position at zero coordinate; 0 except for mimic joints
     pub offset: f64,
+    /// axis, rotation and position that the file means, where its rounded numbers say something
+    /// else; see [`meant`]
+    pub meant: Option<Placement>,
 }
 
 /// Limits of one coordinate; infinite where there is none.
@@ -225,7 +230,7 @@ pub struct Robot {
     pub name: String,
     /// moving bodies, parents before children
     pub bodies: Vec<Body>,
-    /// coordinates, in the order of the joint columns of every log
+    /// coordinates from the base to the tips, in the order of the joint columns of every log
     pub joints: Vec<Joint>,
     /// acceleration of gravity in base axes, m/s²
     pub gravity: Vector3<f64>,

@@ -6,21 +6,21 @@
 //! * fixed joints, and joints held by `lock`, merge the child link into its parent: its inertia is
 //!   moved there and its name kept in [`Body::merged`](super::Body::merged);
 //! * a `mimic` joint moves its body with another coordinate, chains of mimics included;
-//! * coordinates keep the order in which their joints appear in the file; bodies are sorted
-//!   parents before children;
+//! * coordinates and bodies are numbered from the base to the tips: a parent before its children,
+//!   one branch to its end before the next, branches in the order of the file;
 //! * the inertia of links that do not move is ignored.
 //!
 //! Meshes, transmissions, sensors and simulator extensions are skipped. What is imperfect but
 //! usable (no inertia, placeholder limits) becomes a [`Warning`]; what is contradictory is an
-//! error with file, line, link or joint, and what to do. Angles are kept as written: `1.5708` is
-//! not taken for a right angle.
+//! error with file, line, link or joint, and what to do. Angles are kept as written; what `1.5708`
+//! and `-5.24e-08` mean is kept beside them, see [`meant`](super::meant).
 
 mod drive;
 mod limits;
 mod read;
 mod tree;
 
-use super::{Inertia, Robot};
+use super::{Inertia, Placement, Robot};
 use crate::error::{Result, Warning};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -179,6 +179,8 @@ struct UrdfJoint {
     position: Vector3<f64>,
     /// unit length
     axis: Vector3<f64>,
+    /// the three as they are meant
+    meant: Placement,
     limit: Option<Limit>,
     mimic: Option<Mimic>,
     damping: f64,

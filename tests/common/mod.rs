@@ -97,6 +97,7 @@ pub fn robot(seed: u64, n: usize, mimic: bool) -> Robot {
             coordinate: if follow { 0 } else { joints.len() - 1 },
             ratio: if follow { -0.7 } else { 1.0 },
             offset: if follow { 0.2 } else { 0.0 },
+            meant: None,
         });
     }
     Robot {

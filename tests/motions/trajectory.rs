@@ -52,6 +52,7 @@ fn body(parent: Option<usize>, motion: Motion, coordinate: usize) -> Body {
         coordinate,
         ratio: 1.0,
         offset: 0.0,
+        meant: None,
     }
 }
 

@@ -172,7 +172,7 @@ fn fixed_links_before_the_first_joint_only_move_it() {
 }
 
 #[test]
-fn coordinates_keep_document_order_and_bodies_tree_order() {
+fn coordinates_and_bodies_go_from_the_base_to_the_tips() {
     // the file lists the joints of a branched tree from the tips to the base
     let r = robot(&[
         plain("c"),
@@ -185,7 +185,7 @@ fn coordinates_keep_document_order_and_bodies_tree_order() {
         joint("middle", "prismatic", "a", "b", ""),
         joint("first", "revolute", "base", "a", ""),
     ]);
-    assert_eq!(r.joint_names(), ["tip", "branch", "middle", "first"]);
+    assert_eq!(r.joint_names(), ["first", "branch", "middle", "tip"]);
     let bodies: Vec<_> = r
         .bodies
         .iter()
@@ -194,10 +194,10 @@ fn coordinates_keep_document_order_and_bodies_tree_order() {
     assert_eq!(
         bodies,
         [
-            ("a", None, 3),
+            ("a", None, 0),
             ("b2", Some(0), 1),
             ("b", Some(0), 2),
-            ("c", Some(2), 0)
+            ("c", Some(2), 3)
         ]
     );
     assert!(

@@ -153,6 +153,9 @@ impl<'a> Information<'a> {
     /// Gradients `∂(uᵀG u)/∂x` for each column `u` of `vectors` (`r × k`), as the columns of the
     /// result (`x` × `k`). Needs [`Information::evaluate`] at the same point before.
     pub fn quadratic_gradients(&self, e: &mut Evaluation, vectors: MatRef<'_, f64>) -> Mat<f64> {
+        if vectors.ncols() == 0 {
+            return Mat::zeros(self.len(), 0);
+        }
         let d = self
             .model
             .quadratic_gradients(e, self.transform.as_ref(), vectors);

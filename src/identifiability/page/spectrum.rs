@@ -36,7 +36,8 @@ pub(super) fn section(a: &Assessment) -> Section {
             (Colour::GREY, Shape::Dots, "rounding"),
             (Colour::VERMILLION, Shape::Line, "border"),
         ]))
-        "Left: the regressor over random states inside the limits, columns scaled to unit length. "
+        "Left: the regressor over random states inside the limits, with the geometry that the file "
+        "means: what is a right angle but for rounding counts as one. "
         @if a.excitation.is_some() {
             "Right: the regressor of all standard parameters over one period."
         }
@@ -48,8 +49,9 @@ pub(super) fn section(a: &Assessment) -> Section {
     let body = html! {
         (html::figure(svg, caption))
         p {
-            "Between the smallest singular value that counts and the largest that does not lies "
-            (gap) "."
+            "The smallest singular value that counts is " (significant(base.singular_value_above, 2))
+            " of the largest, the largest that does not is "
+            (significant(base.singular_value_below, 2)) ": between them lies " (gap) "."
         }
         @if let Some(e) = &a.excitation {
             (conditions(&e.condition, e.log_det))

@@ -493,6 +493,7 @@ fn split(robot: &mut Robot, joint: &str, axes: &[Vector3<f64>]) -> Result<(), St
             coordinate: c + k,
             ratio: 1.0,
             offset: 0.0,
+            meant: None,
         };
         let coordinate = Joint {
             name,

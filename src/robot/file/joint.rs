@@ -31,6 +31,15 @@ pub(crate) struct JointEntry {
     identify: Vec<Spanned<String>>,
 }
 
+/// Smallest and largest size of a number other than 0: what lies outside is a slip, and its square
+/// would leave the range of numbers.
+const SMALLEST: f64 = 1e-12;
+const LARGEST: f64 = 1e12;
+
+fn in_range(x: f64) -> bool {
+    x == 0.0 || (SMALLEST..=LARGEST).contains(&x.abs())
+}
+
 fn nameless() -> Spanned<String> {
     Spanned::new(0..0, String::new())
 }
@@ -41,7 +50,24 @@ pub(crate) fn stated_limits(source: Text, entry: &JointEntry, what: &str) -> Res
         None => None,
         Some(position) => match position.get_ref()[..] {
             // false where one of them is not a number
-            [lower, upper] if lower < upper => Some([lower, upper]),
+            [lower, upper]
+                if lower < upper
+                    && [lower, upper]
+                        .iter()
+                        .all(|x| x.is_infinite() || in_range(*x)) =>
+            {
+                Some([lower, upper])
+            }
+            [lower, upper] if lower < upper => {
+                return Err(source.error(
+                    position.span().start,
+                    what,
+                    format!(
+                        "position = [{lower:e}, {upper:e}] is beyond {LARGEST:e}; write inf where \
+                         there is no limit"
+                    ),
+                ));
+            }
             _ => {
                 return Err(source.error(
                     position.span().start,
@@ -71,6 +97,14 @@ fn positive(
             what,
             format!(
                 "{key} = {} must be positive; leave it out where there is none",
+                v.get_ref()
+            ),
+        )),
+        Some(v) if v.get_ref().is_finite() && !in_range(*v.get_ref()) => Err(source.error(
+            v.span().start,
+            what,
+            format!(
+                "{key} = {:e} is not between {SMALLEST:e} and {LARGEST:e}; correct it, in SI units",
                 v.get_ref()
             ),
         )),
@@ -117,11 +151,11 @@ pub(crate) fn joint_values(
     )?;
     if let Some(ratio) = &entry.gear_ratio {
         let value = *ratio.get_ref();
-        if !value.is_finite() || value == 0.0 {
+        if !in_range(value) || value == 0.0 {
             return Err(source.error(
                 ratio.span().start,
                 what,
-                format!("gear_ratio = {value} must be finite and not 0"),
+                format!("gear_ratio = {value:e} must be finite, not 0, and that of a real gear"),
             ));
         }
         joint.gear_ratio = Some(value);
@@ -150,6 +184,17 @@ pub(crate) fn joint_values(
         let (at, value) = (value.span().start, *value.get_ref());
         if !value.is_finite() {
             return Err(source.error(at, what, format!("{} must be finite", term.name())));
+        }
+        if !in_range(value) {
+            return Err(source.error(
+                at,
+                what,
+                format!(
+                    "{} = {value:e} is not between {SMALLEST:e} and {LARGEST:e}; correct it, in \
+                     SI units",
+                    term.name()
+                ),
+            ));
         }
         if value < 0.0 && term != JointTerm::Offset {
             warnings.push(Warning::new(

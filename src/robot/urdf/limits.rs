@@ -5,6 +5,19 @@ use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Limits;
 use std::path::Path;
 
+/// A position (rad or m) beyond this is the way in which a file says that there is no limit.
+const NO_POSITION: f64 = 1e6;
+/// A limit of velocity or effort below this is a zero.
+const NO_MOTION: f64 = 1e-9;
+
+/// The end of a range; infinite where it is too far away to be one.
+fn unlimited(end: Option<f64>) -> Option<f64> {
+    end.map(|x| match x.abs() > NO_POSITION {
+        true => x.signum() * f64::INFINITY,
+        false => x,
+    })
+}
+
 /// Limits of a moving joint. Absent limits, and the zeros that exporters write for them, mean
 /// "none" and are reported, unless `stated` gives a value.
 pub(super) fn of_joint(
@@ -23,7 +36,18 @@ pub(super) fn of_joint(
     if let Some(position) = stated.position {
         limits.position = position;
     } else if joint.kind != Kind::Continuous {
+        let far = |x: Option<f64>| x.is_some_and(|x| x.abs() > NO_POSITION);
         let ends = joint.limit.map_or((None, None), |l| (l.lower, l.upper));
+        if far(ends.0) || far(ends.1) {
+            warnings.push(Warning::new(
+                &what,
+                format!(
+                    "a position limit above {NO_POSITION:e} is taken as none; state `position` in \
+                     robot.toml"
+                ),
+            ));
+        }
+        let ends = (unlimited(ends.0), unlimited(ends.1));
         match (ends.0.unwrap_or(0.0), ends.1.unwrap_or(0.0)) {
             (0.0, 0.0) => missing.push("position"),
             (lower, upper) if lower > upper => {
@@ -32,7 +56,7 @@ pub(super) fn of_joint(
                      correct them or state `position` in robot.toml"
                 ));
             }
-            (lower, upper) if lower == upper => {
+            (lower, upper) if lower == upper && lower.is_finite() => {
                 return error(format!(
                     "both limits are {lower}: it cannot move; \
                      correct them, make it fixed, or `lock` it in robot.toml"
@@ -57,7 +81,7 @@ pub(super) fn of_joint(
             Some(value) if value < 0.0 => Err(format!(
                 "its {name} limit is {value}; correct the sign or state `{name}` in robot.toml"
             )),
-            Some(value) if value > 0.0 => Ok(Some(value)),
+            Some(value) if value > NO_MOTION => Ok(Some(value)),
             _ => Ok(None),
         },
     };
@@ -105,7 +129,7 @@ pub(super) fn narrow(
     if let (Some(velocity), None) = (velocity, stated.velocity) {
         limits.velocity = limits.velocity.min(velocity / ratio.abs());
     }
-    let (Some(lower), Some(upper)) = (limit.lower, limit.upper) else {
+    let (Some(lower), Some(upper)) = (unlimited(limit.lower), unlimited(limit.upper)) else {
         return;
     };
     if stated.position.is_some()

@@ -2,8 +2,8 @@
 
 use super::{Kind, Limit, Link, Mimic, Urdf, UrdfJoint};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::robot::Inertia;
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use crate::robot::{Inertia, Placement, meant};
+use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
 use std::path::Path;
@@ -12,6 +12,10 @@ use std::path::Path;
 const TRIANGLE_TOLERANCE: f64 = 1e-3;
 /// Relative tolerance on a negative principal moment.
 const EIGENVALUE_TOLERANCE: f64 = 1e-6;
+
+/// Largest length (m), mass (kg) and moment of inertia (kg m²) of anything that is taken for a
+/// robot. What is more is a slip of a digit or of a unit, and would leave no digit for the rest.
+const LARGEST: [f64; 3] = [1e7, 1e6, 1e8];
 
 /// Elements whose attributes are read.
 const READ: [&str; 12] = [
@@ -109,11 +113,68 @@ impl<'a> Source<'a> {
             return Ok((Matrix3::identity(), Vector3::zeros()));
         };
         let position = self.vector(node, "xyz", what)?.unwrap_or_default();
-        let rotation = match self.vector(node, "rpy", what)? {
-            Some(a) if a != Vector3::zeros() => Rotation3::from_euler_angles(a.x, a.y, a.z).into(),
-            _ => Matrix3::identity(),
+        if position.amax() > LARGEST[0] {
+            return Err(self.error(
+                node,
+                what,
+                format!(
+                    "`xyz=\"{}\"` lies {:.1e} m away, and {:.0e} m is the most that is read; \
+                     correct it, in m",
+                    shorten(node.attribute("xyz").unwrap_or_default()),
+                    position.amax(),
+                    LARGEST[0]
+                ),
+            ));
+        }
+        let rpy = self.vector(node, "rpy", what)?.unwrap_or_default();
+        Ok((meant::rotation(&rpy), position))
+    }
+
+    /// The rotation that `rpy` of an `<origin>` means, with a warning about numbers that are
+    /// written too short.
+    fn meant_rotation(
+        &self,
+        node: Option<Node>,
+        what: &str,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Matrix3<f64>> {
+        let Some(node) = node else {
+            return Ok(Matrix3::identity());
         };
-        Ok((rotation, position))
+        let mut rpy = self.vector(node, "rpy", what)?.unwrap_or_default();
+        let texts = node.attribute("rpy").unwrap_or_default();
+        for (x, text) in rpy.iter_mut().zip(texts.split_whitespace()) {
+            let angle = meant::angle(text, *x);
+            if angle.coarse {
+                warnings.push(Warning::new(
+                    WarningKind::AngleRounded,
+                    what,
+                    format!(
+                        "line {}: rpy holds {text}, taken for {} where it is decided what can be \
+                         identified; write {:.16}",
+                        self.line(node),
+                        multiple_of_pi(angle.value),
+                        angle.value
+                    ),
+                ));
+            }
+            *x = angle.value;
+        }
+        Ok(meant::rotation(&rpy))
+    }
+}
+
+/// A multiple of a right angle in words: `pi`, `-pi/2`, `3 pi/2`.
+fn multiple_of_pi(angle: f64) -> String {
+    let halves = (angle / std::f64::consts::FRAC_PI_2).round();
+    let sign = if halves < 0.0 { "-" } else { "" };
+    let (count, over) = match halves.abs() {
+        n if n % 2.0 == 0.0 => (n / 2.0, ""),
+        n => (n, "/2"),
+    };
+    match count == 1.0 {
+        true => format!("{sign}pi{over}"),
+        false => format!("{sign}{count} pi{over}"),
     }
 }
 
@@ -213,6 +274,11 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
     if urdf.links.is_empty() {
         return Err(source.error(root, "<robot>", "it has no <link>; nothing can move"));
     }
+    let coordinates = urdf.joints.iter().flat_map(|j| j.position.iter().copied());
+    let largest = coordinates.fold(0.0, |most: f64, x| most.max(x.abs()));
+    for joint in &mut urdf.joints {
+        joint.meant.position = meant::position(&joint.position, largest);
+    }
     Ok(urdf)
 }
 
@@ -298,6 +364,17 @@ fn inertial_parameters(
         );
     }
     let mass = mass.unwrap_or(0.0);
+    if mass.abs() > LARGEST[1] {
+        return Err(source.error(
+            node,
+            what,
+            format!(
+                "its mass is {mass:.1e} kg, and {:.0e} kg is the most that is read; correct it, \
+                 in kg",
+                LARGEST[1]
+            ),
+        ));
+    }
     let mut entries = [0.0; 6];
     if let Some(tensor) = child(node, "inertia", what, &mut again) {
         let names = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
@@ -314,6 +391,18 @@ fn inertial_parameters(
                 format!("<inertia> lacks {}; taken as 0", absent.join(", ")),
             );
         }
+    }
+    let most = entries.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    if most > LARGEST[2] {
+        return Err(source.error(
+            node,
+            what,
+            format!(
+                "its inertia tensor holds {most:.1e} kg m^2, and {:.0e} is the most that is read; \
+                 correct it, in kg m^2",
+                LARGEST[2]
+            ),
+        ));
     }
     let [xx, xy, xz, yy, yz, zz] = entries;
     let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -406,7 +495,13 @@ fn joint(
         })
     };
     let (parent, child_link) = (end("parent")?, end("child")?);
-    let (rotation, position) = source.origin(child(node, "origin", what, warnings), what)?;
+    let origin = child(node, "origin", what, warnings);
+    let (rotation, position) = source.origin(origin, what)?;
+    let mut coarse = Vec::new();
+    let meant_rotation = source.meant_rotation(origin, what, &mut coarse)?;
+    if kind != Kind::Fixed {
+        warnings.append(&mut coarse);
+    }
     let axis = match child(node, "axis", what, warnings) {
         Some(a) => {
             let axis = source.vector(a, "xyz", what)?.unwrap_or(Vector3::x());
@@ -476,6 +571,11 @@ fn joint(
         rotation,
         position,
         axis,
+        meant: Placement {
+            axis: meant::axis(&axis),
+            rotation: meant_rotation,
+            position,
+        },
         limit,
         mimic,
         damping,

@@ -3,9 +3,21 @@
 use super::drive::{Drive, drives};
 use super::{Kind, MAX_MOVING_JOINTS, Options, StatedLimits, Urdf, UrdfJoint, limits};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::robot::{Body, Joint, Motion, Prior, Robot};
+use crate::robot::meant::angle;
+use crate::robot::{Body, Joint, Motion, Placement, Prior, Robot};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use std::collections::HashMap;
+
+impl UrdfJoint {
+    /// Axis, rotation and position as written.
+    fn written(&self) -> Placement {
+        Placement {
+            axis: self.axis,
+            rotation: self.rotation,
+            position: self.position,
+        }
+    }
+}
 
 impl Urdf {
     /// An error at a joint.
@@ -21,11 +33,11 @@ pub(super) fn build(urdf: &Urdf, options: &Options) -> Result<Robot> {
     let order = order(urdf, &children)?;
     let drives = drives(urdf, options, &mut warnings)?;
 
-    // coordinates in document order
+    // coordinates from the base to the tips, as the bodies
     let mut coordinate = vec![usize::MAX; urdf.joints.len()];
     let mut joints = Vec::new();
     let mut moving = 0;
-    for i in 0..urdf.joints.len() {
+    for &(i, _) in &order {
         let Drive::Follows { leader, .. } = drives[i] else {
             continue;
         };
@@ -239,6 +251,63 @@ fn coordinate_of(
     })
 }
 
+/// Axes and origin of a link in the frame of the body it belongs to.
+#[derive(Clone, Copy)]
+struct Frame {
+    rotation: Matrix3<f64>,
+    position: Vector3<f64>,
+}
+
+impl Default for Frame {
+    fn default() -> Self {
+        Frame {
+            rotation: Matrix3::identity(),
+            position: Vector3::zeros(),
+        }
+    }
+}
+
+impl Frame {
+    /// The frame of the link that hangs here on a joint, at zero joint position.
+    fn then(&self, place: &Placement) -> Frame {
+        Frame {
+            rotation: self.rotation * place.rotation,
+            position: self.position + self.rotation * place.position,
+        }
+    }
+
+    /// Moves it along its joint to a position (rad or m) where that is held.
+    fn hold(&mut self, joint: &UrdfJoint, axis: &Vector3<f64>, q: f64) {
+        match motion(joint.kind) {
+            Motion::Revolute if q != 0.0 => {
+                let axis = Unit::new_unchecked(*axis);
+                self.rotation *= Rotation3::from_axis_angle(&axis, q).matrix();
+            }
+            Motion::Revolute => {}
+            Motion::Prismatic => self.position += self.rotation * (axis * q),
+        }
+    }
+}
+
+/// The position that is meant where a joint is held.
+fn held(kind: Kind, q: f64) -> f64 {
+    match motion(kind) {
+        Motion::Revolute => angle("", q).value,
+        Motion::Prismatic => q,
+    }
+}
+
+/// Where a link is.
+#[derive(Clone, Copy, Default)]
+struct Pose {
+    /// the body it belongs to; `None`: the base
+    body: Option<usize>,
+    /// in the frame of that body
+    written: Frame,
+    /// the same with what the file means
+    meant: Frame,
+}
+
 /// Merges what does not move and collects the rest.
 fn bodies(
     urdf: &Urdf,
@@ -247,44 +316,24 @@ fn bodies(
     coordinate: &[usize],
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Body>> {
-    /// pose of a link in the frame of the body it belongs to (`None`: the base)
-    #[derive(Clone)]
-    struct Pose {
-        body: Option<usize>,
-        rotation: Matrix3<f64>,
-        position: Vector3<f64>,
-    }
-    let base = Pose {
-        body: None,
-        rotation: Matrix3::identity(),
-        position: Vector3::zeros(),
-    };
     let mut poses: HashMap<&str, Pose> = HashMap::with_capacity(urdf.links.len());
     let mut bodies: Vec<Body> = Vec::new();
     let mut has_inertial = Vec::new();
     for &(j, l) in order {
         let (joint, link) = (&urdf.joints[j], &urdf.links[l]);
-        let parent = poses
-            .get(joint.parent.as_str())
-            .cloned()
-            .unwrap_or_else(|| base.clone());
-        let mut rotation = parent.rotation * joint.rotation;
-        let mut position = parent.position + parent.rotation * joint.position;
+        let parent = poses.get(joint.parent.as_str()).copied();
+        let parent = parent.unwrap_or_default();
+        let mut written = parent.written.then(&joint.written());
+        let mut meant = parent.meant.then(&joint.meant);
         let mut body = parent.body;
         match drives[j] {
             Drive::Held(q) => {
-                match motion(joint.kind) {
-                    Motion::Revolute if q != 0.0 => {
-                        let axis = Unit::new_unchecked(joint.axis);
-                        rotation *= Rotation3::from_axis_angle(&axis, q).matrix();
-                    }
-                    Motion::Revolute => {}
-                    Motion::Prismatic => position += rotation * (joint.axis * q),
-                }
+                written.hold(joint, &joint.axis, q);
+                meant.hold(joint, &joint.meant.axis, held(joint.kind, q));
                 if let Some(b) = body {
                     if let Some(inertia) = &link.inertia {
-                        bodies[b].inertia =
-                            bodies[b].inertia + inertia.in_parent(&rotation, &position);
+                        bodies[b].inertia = bodies[b].inertia
+                            + inertia.in_parent(&written.rotation, &written.position);
                         has_inertial[b] = true;
                     }
                     bodies[b].merged.push(link.name.clone());
@@ -297,21 +346,30 @@ fn bodies(
             } => {
                 body = Some(bodies.len());
                 has_inertial.push(link.inertia.is_some());
+                let place = |frame: &Frame, axis: Vector3<f64>| Placement {
+                    axis,
+                    rotation: frame.rotation,
+                    position: frame.position,
+                };
+                let as_meant = place(&meant, joint.meant.axis);
                 bodies.push(Body {
                     name: link.name.clone(),
                     joint_name: joint.name.clone(),
                     parent: parent.body,
                     motion: motion(joint.kind),
                     axis: joint.axis,
-                    rotation,
-                    position,
+                    rotation: written.rotation,
+                    position: written.position,
                     inertia: link.inertia.unwrap_or_default(),
                     merged: Vec::new(),
                     coordinate: coordinate[leader],
                     ratio,
                     offset,
+                    meant: as_meant
+                        .differs(&place(&written, joint.axis))
+                        .then_some(as_meant),
                 });
-                (rotation, position) = (Matrix3::identity(), Vector3::zeros());
+                (written, meant) = Default::default();
             }
         }
         if body.is_some() {
@@ -321,8 +379,8 @@ fn bodies(
             &link.name,
             Pose {
                 body,
-                rotation,
-                position,
+                written,
+                meant,
             },
         );
     }
