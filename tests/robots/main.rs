@@ -7,5 +7,6 @@ mod base;
 mod files;
 mod identities;
 mod plant;
+mod rank;
 mod reference;
 mod tree;

@@ -31,8 +31,8 @@ pub(crate) struct JointEntry {
     identify: Vec<Spanned<String>>,
 }
 
-/// Smallest and largest size of a number other than 0: what lies outside is a slip, and its square
-/// would leave the range of numbers.
+/// Smallest and largest limit: what lies outside is a slip, and powers of it would leave the range
+/// of numbers.
 const SMALLEST: f64 = 1e-12;
 const LARGEST: f64 = 1e12;
 
@@ -54,7 +54,7 @@ pub(crate) fn stated_limits(source: Text, entry: &JointEntry, what: &str) -> Res
                 if lower < upper
                     && [lower, upper]
                         .iter()
-                        .all(|x| x.is_infinite() || in_range(*x)) =>
+                        .all(|x| x.is_infinite() || x.abs() <= LARGEST) =>
             {
                 Some([lower, upper])
             }
@@ -185,13 +185,12 @@ pub(crate) fn joint_values(
         if !value.is_finite() {
             return Err(source.error(at, what, format!("{} must be finite", term.name())));
         }
-        if !in_range(value) {
+        if value.abs() > LARGEST {
             return Err(source.error(
                 at,
                 what,
                 format!(
-                    "{} = {value:e} is not between {SMALLEST:e} and {LARGEST:e}; correct it, in \
-                     SI units",
+                    "{} = {value:e} is beyond {LARGEST:e}; correct it, in SI units",
                     term.name()
                 ),
             ));
