@@ -242,6 +242,7 @@ impl BaseParameters {
         let (kept, k) = keep(&r, rank, tolerance, passes);
         if kept.len() != rank {
             warnings.push(Warning::new(
+                WarningKind::RankGap,
                 "rank",
                 format!(
                     "{rank} parameters are independent, and only {} columns could be told to be; \

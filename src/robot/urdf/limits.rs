@@ -40,6 +40,7 @@ pub(super) fn of_joint(
         let ends = joint.limit.map_or((None, None), |l| (l.lower, l.upper));
         if far(ends.0) || far(ends.1) {
             warnings.push(Warning::new(
+                WarningKind::LimitsMissing,
                 &what,
                 format!(
                     "a position limit above {NO_POSITION:e} is taken as none; state `position` in \
