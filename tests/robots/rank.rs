@@ -3,9 +3,9 @@
 
 use excite::base::{BaseParameters, CLEAR};
 use excite::design::{Settings, design};
-use excite::identifiability::{Assessment, json, page};
+use excite::identifiability::{assess, json, page};
+use excite::plant::Plant;
 use excite::robot::{Robot, meant};
-use std::sync::atomic::AtomicBool;
 
 /// Numbers as the file prints them, or what they stand for.
 #[derive(Clone, Copy, PartialEq)]
@@ -314,7 +314,7 @@ fn a_rounded_arm_is_excited_as_well_as_an_exact_one() {
     };
     let condition = |numbers| {
         let robot = robot(&hobby_arm(numbers));
-        let d = design(&robot, &settings, &AtomicBool::new(false), &|_| {}).unwrap();
+        let d = design(&Plant::from(robot.clone()), &settings).unwrap();
         d.value
     };
     let (printed, exact) = (condition(Numbers::Printed), condition(Numbers::Exact));
@@ -352,7 +352,7 @@ fn no_parameter_is_lost_where_singular_values_fall_smoothly() {
 /// Both sides of the gap are shown.
 #[test]
 fn the_report_shows_both_sides_of_the_gap() {
-    let assessment = Assessment::of_robot(&robot(&hobby_arm(Numbers::Printed))).unwrap();
+    let assessment = assess(&Plant::from(robot(&hobby_arm(Numbers::Printed))), None).unwrap();
     let report = json::json(&assessment, None, 0.0);
     let border = &report["rank_border"];
     assert!(border["above"].as_f64().unwrap() > 1e-3, "{border}");
@@ -456,7 +456,7 @@ fn designed(robot: &Robot) -> excite::Result<excite::design::Design> {
         starts: Some(1),
         ..Settings::default()
     };
-    design(robot, &settings, &AtomicBool::new(false), &|_| {})
+    design(&Plant::from(robot.clone()), &settings)
 }
 
 /// "needs inf % of its effort limit" before, without a word on the fingers that follow.
@@ -537,7 +537,7 @@ fn a_load_that_leaves_no_motion_is_an_error() {
                 ..Settings::default()
             };
             let robot = robot(&text);
-            match design(&robot, &settings, &AtomicBool::new(false), &|_| {}) {
+            match design(&Plant::from(robot.clone()), &settings) {
                 Ok(d) => assert!(d.value.is_finite()),
                 Err(e) => assert!(e.to_string().contains("planar2"), "{e}"),
             }
