@@ -38,7 +38,7 @@ impl Regressor {
         Self::with_tree(robot, &Tree::new(robot), motion)
     }
 
-    /// The same for a robot that was flattened before.
+    /// Evaluates `W` for all samples with a [`Tree`] of the robot made before.
     ///
     /// # Panics
     /// If the motion is of another robot.

@@ -16,8 +16,8 @@ use std::path::PathBuf;
                   of its drives.\n\nEXPERIMENT is an experiment.toml. Records with payload = \
                   \"unknown\" carry the load, records with \"none\" are of the empty robot; without \
                   the latter the nominal model is subtracted. Records with a known payload, { mass, \
-                  com, inertia }, tell the gains of the drives first. The motions need not be the \
-                  same.\n\nWrites load.json and report.html.",
+                  com, inertia }, identify the gains of the drives first. The motions may \
+                  differ.\n\nWrites load.json and report.html.",
     after_help = "Examples:\n  excite load experiment.toml --output load\n  excite load \
                   experiment.toml --parameters mass-com\n  excite load experiment.toml --method \
                   two-step --json"
@@ -41,7 +41,7 @@ pub struct Args {
     /// Do not take weight from samples near standstill
     #[arg(long)]
     unweighted: bool,
-    /// Give the estimate as it is, also where no body has such an inertia
+    /// Give the estimate as it is, even if no rigid body could have it
     #[arg(long)]
     unconstrained: bool,
     /// Mean speed of the actuators at which samples begin to count in the two steps, rad/s or m/s

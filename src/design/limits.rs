@@ -120,7 +120,7 @@ impl Limits {
         }
     }
 
-    /// The same with another posture of rest, where it lies inside the ranges.
+    /// These limits about another posture of rest, where it lies inside the ranges.
     pub fn resting(mut self, home: &[f64]) -> Self {
         let inside = |(j, x): (usize, &f64)| {
             let mut bands = self.bands[j].iter().filter(|b| b.order == 0);

@@ -23,7 +23,7 @@ pub trait Lanes:
 {
     /// samples in a pack
     const WIDTH: usize;
-    /// The same number in all lanes.
+    /// One number in all lanes.
     fn splat(x: f64) -> Self;
     /// Reads `WIDTH` consecutive numbers.
     ///

@@ -18,7 +18,7 @@ impl Spread {
         self.floor.powi(2) + (self.peak * e).powi(2)
     }
 
-    /// The same spread at all speeds.
+    /// A spread that does not depend on the speed.
     pub fn even(floor: f64) -> Self {
         Spread {
             floor,

@@ -189,7 +189,7 @@ impl Mechanism {
             contract(dqd, gqd, n, m, count, ox);
             contract(dqdd, gqdd, n, m, count, ox);
 
-            // change of G: λᵀ F_xx[u, ·]
+            // change of G: μᵀ F_xx[v, ·]
             let bodies = 10 * self.tree.bodies();
             let phi = &ws.phi[v * bodies..(v + 1) * bodies];
             let gamma = &mut ws.torque;

@@ -2,7 +2,7 @@
 //! translates and turns about the vertical (Pierrot & Company 1999).
 //!
 //! The bars keep their orientation, so the hinges turn by `−θ` and the end of chain `i` on bar `k`
-//! is `B_i = p + Rz(θ) c_k + β_i`. Every rod is a body: 15 bodies, 150 columns. See
+//! is `b_i = p + Rz(ϑ) c_k + β_i`. Every rod is a body: 15 bodies, 150 columns. See
 //! [`parallelogram`] for the chain.
 //!
 //! **Lumped model** (Vivas, Poignet, Renaud et al.): half of each forearm at the arm's tip, half on

@@ -150,7 +150,7 @@ impl Plant {
         &self.robot
     }
 
-    /// The same, as the kernels read it.
+    /// The bodies and joints as the kernels read them.
     pub fn tree(&self) -> &Tree {
         &self.tree
     }

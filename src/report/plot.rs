@@ -99,7 +99,7 @@ impl Series {
         }
     }
 
-    /// The same values against `0, dx, 2 dx …`.
+    /// A line of values against `0, dx, 2 dx …`.
     pub fn sampled(values: &[f64], dx: f64, colour: Colour) -> Self {
         Self::line(
             values

@@ -78,7 +78,7 @@ impl Inertia {
         }
     }
 
-    /// The same body seen from a parent frame `A`, when this frame `B` sits there with rotation
+    /// This body seen from a parent frame `A`, when this frame `B` sits there with rotation
     /// `R_AB` and origin `p_AB_A`.
     pub fn in_parent(&self, rotation: &Matrix3<f64>, position: &Vector3<f64>) -> Self {
         let m = self.mass();

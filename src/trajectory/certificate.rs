@@ -296,7 +296,7 @@ impl Certificate {
         }
     }
 
-    /// The same certificate with the torques of [`torque_certificate`](super::torque_certificate),
+    /// This certificate with the torques of [`torque_certificate`](super::torque_certificate),
     /// one per joint.
     pub fn with_torque(self, torque: Vec<TorqueBound>) -> Self {
         let mut joints = self.joints;

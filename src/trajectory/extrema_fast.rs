@@ -5,7 +5,7 @@ use super::fourier::{Series, differentiated, sin_cos_turns};
 use super::table::Table;
 use std::f64::consts::TAU;
 
-/// All local extrema of the derivative of the given order that a grid can tell apart, refined by
+/// All local extrema of the derivative of the given order that a grid resolves, refined by
 /// Newton's method: times in `[0, T)` and values, in order of time, into `out` (cleared first);
 /// never empty. `table` should hold at least 16 samples per period of the highest harmonic, then
 /// nothing of size is missed; `work` is memory kept between calls. A constant curve gives its
