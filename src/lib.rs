@@ -64,6 +64,7 @@ pub mod diagnose;
 pub mod documentation;
 pub mod dynamics;
 pub mod error;
+pub mod export;
 pub mod identifiability;
 pub mod identify;
 pub mod load;

@@ -1,12 +1,11 @@
 //! `excite diagnose EXPERIMENT`.
 
-use super::{pretty, print, warn, write};
-use excite::diagnose::{Settings, diagnose, improve, json, page};
-use excite::identify::robot::urdf;
+use super::{Folder, pretty, print, unwritten, warn};
+use excite::Result;
+use excite::diagnose::{Settings, diagnose, json, page};
+use excite::export::{self, Model};
 use excite::log::Experiment;
-use excite::output::prepare_dir;
 use excite::report::format::{percent, significant};
-use excite::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -49,12 +48,9 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let experiment = Experiment::read(&args.experiment)?;
-    let serial = experiment.plant.mechanism().is_none();
-    let mut names = vec!["diagnosis.json", "report.html", "robot.urdf", "next.json"];
-    if serial {
-        names.extend(["robot.toml", "robot.xml"]);
-    }
-    let paths = prepare_dir(&args.output, &names, args.force)?;
+    let mut names = vec!["diagnosis.json", "report.html", "next.json"];
+    names.extend(export::files(&experiment.plant));
+    let folder = Folder::new(&args.output, &names, args.force)?;
     let settings = Settings {
         next: !args.no_next,
         next_tries: args.next_tries.min(10_000),
@@ -70,28 +66,24 @@ pub fn run(args: Args) -> Result<()> {
         bar.set_message(step.to_string())
     });
     bar.finish_and_clear();
-    let d = result?;
+    let mut d = result?;
+    let model = Model {
+        plant: &experiment.plant,
+        robot: &d.improved.robot,
+        remarks: &d.improved.remarks,
+    };
+    let texts = export::write(&model);
+    let mut more = model.warnings();
+    more.extend(unwritten(&texts, "diagnosis.json"));
+    d.warnings.extend(more);
     warn(&d.warnings);
     let report = json::json(&d, begin.elapsed().as_secs_f64());
-    write(&paths[0], args.force, &pretty(&report))?;
-    write(&paths[1], args.force, &page::html(&d))?;
-    let robot = improve::robot(&experiment.plant, &d);
-    write(&paths[2], args.force, &urdf(&robot))?;
-    if serial {
-        write(
-            &paths[4],
-            args.force,
-            &improve::toml(&robot, &d, "robot.urdf"),
-        )?;
-        write(&paths[5], args.force, &improve::mujoco(&robot, &d))?;
-    }
+    folder.write("diagnosis.json", &pretty(&report))?;
+    folder.write("report.html", &page::html(&d))?;
+    folder.robot(texts)?;
     match &d.next {
-        Some(n) => n.trajectory.write(&paths[3], args.force)?,
-        // that of an earlier diagnosis, which --force replaces
-        None if args.force && paths[3].is_file() => {
-            std::fs::remove_file(&paths[3]).map_err(|e| Error::io(&paths[3], e))?;
-        }
-        None => {}
+        Some(n) => n.trajectory.write(folder.path("next.json"), args.force)?,
+        None => folder.remove("next.json")?,
     }
     if args.json {
         return print(&pretty(&report));
@@ -137,7 +129,7 @@ pub fn run(args: Args) -> Result<()> {
         let _ = writeln!(
             out,
             "\nnext: {} separates {} (overlap {} now, {} predicted)",
-            paths[3].display(),
+            folder.path("next.json").display(),
             n.separates.join(" from "),
             percent(n.overlap[0]),
             percent(n.overlap[1])
@@ -146,7 +138,7 @@ pub fn run(args: Args) -> Result<()> {
     let _ = writeln!(
         out,
         "\n{} in {:.1} s",
-        paths[1].display(),
+        folder.path("report.html").display(),
         begin.elapsed().as_secs_f64()
     );
     print(&out)

@@ -1,12 +1,10 @@
 //! `excite identify EXPERIMENT`.
 
-use super::{pretty, print, warn, write};
+use super::{Folder, pretty, print, unwritten, warn};
+use excite::export::{self, Model};
 use excite::identify::page;
-use excite::identify::{
-    Consistency, Identification, Method, Settings, identify, json, mechanism, robot,
-};
+use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
 use excite::log::Experiment;
-use excite::output::prepare_dir;
 use excite::robot::JointTerm;
 use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
@@ -70,22 +68,9 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let files = [
-        "model.json",
-        "robot.urdf",
-        "robot.xml",
-        "robot.toml",
-        "report.json",
-        "report.html",
-    ];
     let mut experiment = Experiment::read(&args.experiment)?;
     let mut notes = Vec::new();
     experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
-    let serial = experiment.plant.mechanism().is_none();
-    let wanted: Vec<&str> = files
-        .into_iter()
-        .filter(|f| serial || *f != "robot.xml")
-        .collect();
     let mut settings = Settings {
         method: match args.method.as_str() {
             "ols" => Method::Ols,
@@ -106,24 +91,21 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.position_cutoff = args.position_cutoff;
     settings.signals.average = !args.no_average;
     settings.signals.measured_rates = !args.derive;
-    let paths = prepare_dir(&args.output, &wanted, args.force)?;
+    let mut names = vec!["model.json", "report.json", "report.html"];
+    names.extend(export::files(&experiment.plant));
+    let folder = Folder::new(&args.output, &names, args.force)?;
 
     let plant = &experiment.plant;
     let mut id = identify(plant, &experiment.records, &settings)?;
     id.warnings.splice(0..0, notes);
-    let robot = robot::with_values(plant, &id.phi);
-    let file = match plant.mechanism() {
-        None => Ok(robot.to_toml_template("robot.urdf")),
-        Some(m) => mechanism::toml(m, &robot, "robot.urdf"),
+    let model = Model {
+        plant,
+        robot: &plant.with_values(&id.phi),
+        remarks: &[],
     };
-    if let Err(e) = &file {
-        let message = format!("not written: {e}; the values are in model.json");
-        id.warnings.push(Warning::new(
-            WarningKind::FileNotWritten,
-            "robot.toml",
-            message,
-        ));
-    }
+    let texts = export::write(&model);
+    id.warnings.extend(model.warnings());
+    id.warnings.extend(unwritten(&texts, "model.json"));
     warn(&id.warnings);
     let (_, verdict) = page::verdict(plant, &id);
     let report = json::report(
@@ -133,25 +115,10 @@ pub fn run(args: Args) -> Result<()> {
         &verdict,
         begin.elapsed().as_secs_f64(),
     );
-    let mut texts = vec![
-        ("model.json", pretty(&json::model(plant, &id))),
-        ("robot.urdf", robot::urdf(&robot)),
-        ("report.json", pretty(&report)),
-        ("report.html", page::html(plant, &id, &settings)),
-    ];
-    if serial {
-        texts.push(("robot.xml", robot::mujoco(&robot)));
-    }
-    if let Ok(text) = file {
-        texts.push(("robot.toml", text));
-    }
-    let mut written = Vec::new();
-    for (name, path) in wanted.iter().zip(&paths) {
-        if let Some((_, text)) = texts.iter().find(|(n, _)| n == name) {
-            write(path, args.force, text)?;
-            written.push(path.clone());
-        }
-    }
+    let mut written = vec![folder.write("model.json", &pretty(&json::model(plant, &id)))?];
+    written.extend(folder.robot(texts)?);
+    written.push(folder.write("report.json", &pretty(&report))?);
+    written.push(folder.write("report.html", &page::html(plant, &id, &settings))?);
     match args.json {
         true => print(&pretty(&report)),
         false => print(&summary(

@@ -14,9 +14,9 @@ mod torque;
 
 use clap::{Parser, Subcommand};
 use excite::robot::JointTerm;
-use excite::{Error, Plant, Result, Warning};
+use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Exciting trajectories for robots: designed, and proven inside the limits, before the run.
@@ -110,6 +110,71 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
         }
     }
     Ok(plant.with_terms(&terms))
+}
+
+/// The directory that a run writes its files to.
+struct Folder {
+    dir: PathBuf,
+    force: bool,
+}
+
+impl Folder {
+    /// Makes it; nothing in it is in the way of files of these names.
+    fn new(dir: &Path, names: &[&str], force: bool) -> Result<Self> {
+        excite::output::prepare_dir(dir, names, force)?;
+        Ok(Folder {
+            dir: dir.to_path_buf(),
+            force,
+        })
+    }
+
+    /// Path of a file in it.
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) -> Result<PathBuf> {
+        let path = self.path(name);
+        write(&path, self.force, text)?;
+        Ok(path)
+    }
+
+    /// Removes what an earlier run left under a name that this run does not write.
+    fn remove(&self, name: &str) -> Result<()> {
+        let path = self.path(name);
+        match self.force && path.is_file() {
+            true => std::fs::remove_file(&path).map_err(|e| Error::io(path, e)),
+            false => Ok(()),
+        }
+    }
+
+    /// The robot files of a model: those that can be written, with warnings about the others.
+    fn robot(&self, texts: Vec<(&'static str, Result<String>)>) -> Result<Vec<PathBuf>> {
+        let mut written = Vec::new();
+        for (name, text) in texts {
+            match text {
+                Ok(text) => written.push(self.write(name, &text)?),
+                Err(_) => self.remove(name)?,
+            }
+        }
+        Ok(written)
+    }
+}
+
+/// Warnings about robot files that cannot be written; `values` names the file that has their numbers.
+fn unwritten(texts: &[(&'static str, Result<String>)], values: &str) -> Vec<Warning> {
+    let failed = texts
+        .iter()
+        .filter_map(|(name, text)| Some((name, text.as_ref().err()?)));
+    failed
+        .map(|(name, e)| {
+            Warning::new(
+                WarningKind::FileNotWritten,
+                *name,
+                format!("not written: {e}; the values are in {values}"),
+            )
+        })
+        .collect()
 }
 
 /// Writes a text file into a prepared directory.

@@ -238,6 +238,27 @@ impl<'a> Evidence<'a> {
         [gram, &self.l * faer::ColRef::from_slice(&self.d).as_mat()]
     }
 
+    /// `C` with `CᵀC` the information on the first `count` parameters, records and prior together, whatever
+    /// the others are.
+    pub fn information(&self, count: usize) -> Mat<f64> {
+        let p = self.d.len();
+        let a = &self.l * self.l.transpose();
+        // the Schur complement of the others
+        let others = a.submatrix(count, count, p - count, p - count);
+        let mixed = a.submatrix(count, 0, p - count, count);
+        let mut own = a.submatrix(0, 0, count, count).to_owned();
+        if p > count
+            && let Ok(f) = others.llt(Side::Lower)
+        {
+            own -= mixed.transpose() * f.solve(mixed);
+        }
+        let root = match own.llt(Side::Lower) {
+            Ok(f) => f.L().to_owned(),
+            Err(_) => Mat::identity(count, count),
+        };
+        Mat::from_fn(count, count, |i, k| root[(k, i)] / self.spread[k])
+    }
+
     /// `WᵀZ` in units of the prior, `ZᵀZ` and `Zᵀr` over fitted rows.
     pub fn as_seen(&self, a: &Projected) -> [Mat<f64>; 3] {
         let absorbed = a.c.transpose() * faer::ColRef::from_slice(&self.d).as_mat();

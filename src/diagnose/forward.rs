@@ -28,7 +28,6 @@ use super::data::Data;
 use super::record::Record;
 use super::verdict::Member;
 use crate::error::{Error, Result};
-use crate::identify::robot::with_values;
 use crate::report::format::unit_of;
 use crate::robot::Robot;
 use crate::simulate::Dynamics;
@@ -106,7 +105,7 @@ pub fn forward(
     held: std::result::Result<Feedback, String>,
 ) -> Forward {
     let count = data.plant.parameters().len();
-    let robots = phi.map(|phi| with_values(data.plant, &phi[..count]));
+    let robots = phi.map(|phi| data.plant.with_values(&phi[..count]));
     let kept: Vec<usize> = (0..data.records.len())
         .filter(|k| !data.records[*k].fit)
         .collect();

@@ -1,131 +1,133 @@
-//! The model with what was found: `robot.toml`, URDF and MuJoCo terms.
+//! The model with what was found.
+//!
+//! The parameters fitted beside the effects need not be those of bodies that can exist: the records leave
+//! many of them free within the prior. Of all that can, the nearest are taken in the metric of the
+//! information `A = WᵀW + P⁻¹`, in which what the records do not see costs nothing,
+//!
+//! ```text
+//! minimise over φ   ½ (φ − φ̂)ᵀ A (φ − φ̂) + D(φ ‖ φ₀)
+//! ```
+//!
+//! with the entropic distance `D` of [`consistent`](crate::identify::consistent), the barrier that keeps
+//! every body inside.
 
-use super::Diagnosis;
-use crate::identify::robot as files;
+use super::Finding;
+use super::catalogue::{Context, Effect, Estimate};
+use super::evidence::Evidence;
+use crate::error::{Warning, WarningKind};
+use crate::export::{self, FORMATS, Format, Remark};
+use crate::identify::consistent::{self, Prior};
 use crate::plant::Plant;
 use crate::robot::Robot;
-use std::fmt::Write;
 
-/// The robot with its parameters refitted beside the effects; what `robot.toml` can hold of the claimed
-/// effects (armature, viscous and Coulomb friction, offset, payload) is added to them.
-pub fn robot(plant: &Plant, d: &Diagnosis) -> Robot {
-    let mut robot = files::with_values(plant, &d.phi);
-    let actuated = plant.actuated();
-    for f in d
-        .findings
-        .iter()
-        .filter(|f| f.member && f.confidence >= 0.5)
-    {
-        let term = match f.effect {
-            "rotor_inertia" => 0,
-            "viscous_friction" => 1,
-            "coulomb_friction" => 2,
-            "torque_offset" => 3,
-            "payload" | "link_inertia" => {
-                if let Some(j) = f.place.first()
-                    && let Some(b) = robot.bodies.iter().rposition(|b| b.coordinate == *j)
-                {
-                    for (k, v) in f.eta.iter().take(10).enumerate() {
-                        robot.bodies[b].inertia.0[k] += v;
-                    }
-                    // what was fitted is a mass and its moments; its inertia is that of a point
-                    if f.effect == "payload" && f.eta.len() == 4 && f.eta[0] > 0.0 {
-                        let m = f.eta[0];
-                        let c = nalgebra::Vector3::new(f.eta[1], f.eta[2], f.eta[3]) / m;
-                        let i = m
-                            * (nalgebra::Matrix3::identity() * c.norm_squared()
-                                - c * c.transpose());
-                        for (k, v) in [i.m11, i.m12, i.m13, i.m22, i.m23, i.m33]
-                            .into_iter()
-                            .enumerate()
-                        {
-                            robot.bodies[b].inertia.0[4 + k] += v;
-                        }
-                    }
-                }
-                continue;
-            }
-            "joint_coupling" => {
-                // its diagonal part; the rest has no place in a robot.toml
-                continue;
-            }
-            _ => continue,
-        };
-        if let (Some(j), Some(v)) = (f.place.first(), f.eta.first()) {
-            robot.joints[actuated[*j]].terms[term] = *v;
-            robot.joints[actuated[*j]].identify[term] = true;
-        }
-    }
-    robot
+/// The improved model.
+#[derive(Debug, Clone)]
+pub struct Improved {
+    /// bodies and joints with the parameters that were fitted and the effects that they can hold
+    pub robot: Robot,
+    /// the effects found
+    pub remarks: Vec<Remark>,
 }
 
-/// `robot.toml` with the parameters refitted, and the effects that it has no keys for as comments that
-/// say what a simulator must add.
-pub fn toml(robot: &Robot, d: &Diagnosis, urdf: &str) -> String {
-    let mut out = robot.to_toml_template(urdf);
-    let claims: Vec<_> = d
-        .findings
-        .iter()
-        .filter(|f| f.member && f.confidence >= 0.5)
-        .collect();
-    if !claims.is_empty() {
-        out.push_str("\n# Effects found by `excite diagnose`:\n");
-    }
-    for f in claims {
-        let place = match f.joints.is_empty() {
-            true => "whole robot".to_string(),
-            false => f.joints.join(", "),
+/// The robot with the parameters `phi`, and of the findings what was claimed.
+pub fn improve(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    phi: &[f64],
+    findings: &[Finding],
+) -> (Improved, Vec<Warning>) {
+    let plant = cx.data.plant;
+    let mut robot = plant.with_values(phi);
+    let mut remarks = Vec::new();
+    for f in findings.iter().filter(|f| f.member && f.confidence >= 0.5) {
+        let Some(effect) = effects.iter().find(|e| e.card().name == f.effect) else {
+            continue;
         };
-        let _ = writeln!(out, "# {} ({place}): {}", f.effect, f.equation);
-        for v in &f.values {
-            let _ = writeln!(out, "#   {} = {:.6} {}", v.name, v.value, v.unit);
-        }
-    }
-    out
-}
-
-/// MuJoCo's XML: damping, frictionloss and armature of every joint; stiffness, reference and offsets of
-/// the claimed effects where MuJoCo has a term for them, in comments otherwise.
-pub fn mujoco(robot: &Robot, d: &Diagnosis) -> String {
-    let mut out = files::mujoco(robot);
-    let mut notes = String::new();
-    for f in d
-        .findings
-        .iter()
-        .filter(|f| f.member && f.confidence >= 0.5)
-    {
-        let at = f.joints.join(" ");
-        let value = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);
-        let line = match f.effect {
-            "cable_spring" => value("stiffness").map(|k| {
-                let half = f.values.iter().find(|v| v.name == "torque_at_middle").map_or(0.0, |v| v.value);
-                format!("joint \"{at}\": stiffness=\"{k:.6}\" springref at the position where the pull vanishes (torque at the middle of the range {half:.6})")
-            }),
-            "joint_elasticity" => value("stiffness").map(|k| {
-                format!("joint \"{at}\": split it into motor and link joint with stiffness=\"{k:.6}\" between them")
-            }),
-            "joint_offset" => value("offset").map(|o| format!("joint \"{at}\": ref=\"{o:.6}\"")),
-            "backlash" => value("gap").map(|b| {
-                format!("joint \"{at}\": a joint of range=\"{:.6} {:.6}\" in series", -b / 2.0, b / 2.0)
-            }),
-            "torque_delay" => value("delay").map(|s| format!("actuators: delay of {s:.6} s (dyntype filter or a buffer)")),
-            "torque_constant" => value("gain_error").map(|g| format!("actuator \"{at}\": gainprm=\"{:.6}\"", 1.0 / (1.0 + g))),
-            "gravity_direction" => match (value("tilt_x"), value("tilt_y")) {
-                (Some(x), Some(y)) => Some(format!("worldbody: euler=\"{x:.6} {y:.6} 0\" of the base")),
-                _ => None,
+        let estimate = Estimate {
+            place: f.place,
+            shape: f.shape.clone(),
+            eta: f.eta.clone(),
+            std: vec![0.0; f.eta.len()],
+        };
+        let note = |to: &&dyn Format| Some((to.name(), effect.note(cx, &estimate, to.name())?));
+        remarks.push(Remark {
+            effect: f.effect,
+            place: match f.joints.is_empty() {
+                true => "whole robot".to_string(),
+                false => f.joints.join(", "),
             },
-            _ => None,
-        };
-        if let Some(line) = line {
-            let _ = writeln!(notes, "  {}: {line}", f.effect);
-        }
+            equation: f.equation,
+            values: f
+                .values
+                .iter()
+                .map(|v| {
+                    let line = format!("{} = {:.6} {}", v.name, v.value, v.unit);
+                    line.trim_end().to_string()
+                })
+                .collect(),
+            held: effect.apply(cx, &estimate, &mut robot),
+            notes: FORMATS.iter().filter_map(note).collect(),
+        });
     }
-    if !notes.is_empty() {
-        let comment = format!(
-            "<!-- found by excite diagnose\n{}-->\n",
-            notes.replace("--", "- -")
-        );
-        out = format!("{comment}{out}");
-    }
-    out
+    let warnings = able(plant, evidence, &mut robot);
+    (Improved { robot, remarks }, warnings)
 }
+
+/// Turns the bodies of a robot into such that can exist.
+fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> Vec<Warning> {
+    let wanted = plant.values_in(robot);
+    let mut same = robot.clone();
+    plant.set_values(&mut same, &wanted);
+    // values that the unknowns cannot hold are left to the writers
+    let held = same
+        .bodies
+        .iter()
+        .zip(&robot.bodies)
+        .all(|(a, b)| a.inertia == b.inertia);
+    if !held || export::impossible(plant, robot).is_empty() {
+        return Vec::new();
+    }
+    let c = evidence.information(wanted.len());
+    let d: Vec<f64> = (0..c.nrows())
+        .map(|i| (0..wanted.len()).map(|k| c[(i, k)] * wanted[k]).sum())
+        .collect();
+    let prior = Prior::new(plant, &|_| None);
+    match consistent::solve(c.as_ref(), &d, &prior, 1.0, None) {
+        Ok(found) => {
+            plant.set_values(robot, &found.phi);
+            let cost: f64 = (0..c.nrows())
+                .map(|i| {
+                    (0..wanted.len())
+                        .map(|k| c[(i, k)] * found.phi[k])
+                        .sum::<f64>()
+                        - d[i]
+                })
+                .map(|e| e * e)
+                .sum();
+            let rows = (evidence.data.fitted * evidence.data.joints()).max(1) as f64;
+            let rms = (cost / rows).sqrt();
+            match rms > SEEN {
+                true => vec![Warning::new(
+                    WarningKind::InertiaImpossible,
+                    &robot.name,
+                    format!(
+                        "the parameters that fit best are not those of bodies that can exist; those in the robot \
+                         files can, and leave {rms:.2} times the noise more"
+                    ),
+                )],
+                false => Vec::new(),
+            }
+        }
+        Err(e) => vec![Warning::new(
+            WarningKind::InertiaImpossible,
+            &robot.name,
+            format!(
+                "no bodies that can exist were found for the parameters of the robot files: {e}"
+            ),
+        )],
+    }
+}
+
+/// Change of the torque, in units of its noise, that is worth a warning.
+const SEEN: f64 = 0.1;

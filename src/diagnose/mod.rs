@@ -44,7 +44,7 @@ pub use verdict::Verdict;
 use crate::error::{Error, Result, Warning};
 use crate::log::{Experiment, Purpose};
 use crate::plant::Plant;
-use catalogue::{Context, Value};
+use catalogue::{Context, Estimate, Place, Shape, Value};
 use data::Data;
 use evidence::{Evidence, Projected};
 use gap::{JointGap, Shares};
@@ -85,10 +85,10 @@ pub struct Finding {
     pub separated_by: &'static str,
     /// names of the actuators; empty for the whole robot
     pub joints: Vec<String>,
-    /// their indices
-    pub place: Vec<usize>,
-    /// shape constants
-    pub shape: Vec<f64>,
+    /// where
+    pub place: Place,
+    /// shape
+    pub shape: Shape,
     /// coefficients
     pub eta: Vec<f64>,
     /// 0 to 1; a claim from 0.5 on
@@ -190,6 +190,8 @@ pub struct Diagnosis {
     pub untestable: Vec<(&'static str, String, f64)>,
     /// parameters of the nominal model as fitted beside the effects
     pub phi: Vec<f64>,
+    /// the model with the effects that were claimed
+    pub improved: improve::Improved,
     /// proposal for the next experiment
     pub next: Option<next::Proposal>,
     /// the robot simulated under the recorded torques, before and after
@@ -360,7 +362,10 @@ pub fn of_logs(
     progress("report");
 
     let actuators = plant.actuators();
-    let name = |place: &[usize]| place.iter().map(|j| actuators[*j].name.clone()).collect();
+    let name = |place: &Place| {
+        let named = place.named().into_iter();
+        named.map(|j| actuators[j].name.clone()).collect()
+    };
     let members: Vec<&Projected> = decision
         .members
         .iter()
@@ -385,6 +390,12 @@ pub fn of_logs(
         })
         .collect();
 
+    let estimate = |place: Place, shape: &Shape, eta: &[f64], std: &[f64]| Estimate {
+        place,
+        shape: shape.clone(),
+        eta: eta.to_vec(),
+        std: std.to_vec(),
+    };
     let mut findings = Vec::new();
     for (i, m) in decision.members.iter().enumerate() {
         let mut rest = members.clone();
@@ -411,7 +422,7 @@ pub fn of_logs(
             equation: card.equation,
             separated_by: card.separated_by,
             joints: name(&c.place),
-            place: c.place.clone(),
+            place: c.place,
             shape: c.shape.clone(),
             eta: c.eta.clone(),
             confidence: m.confidence,
@@ -421,7 +432,7 @@ pub fn of_logs(
             visibility: m.visibility,
             decoys: m.decoys,
             unsteady: m.unsteady,
-            values: effect.values(&cx, &c.place, &c.shape, &c.eta, &m.std),
+            values: effect.values(&cx, &estimate(c.place, &c.shape, &c.eta, &m.std)),
             same,
             member: true,
             frozen: m.frozen,
@@ -444,7 +455,7 @@ pub fn of_logs(
                 equation: card.equation,
                 separated_by: card.separated_by,
                 joints: name(&r.place),
-                place: r.place.clone(),
+                place: r.place,
                 shape: r.shape.clone(),
                 eta: r.eta.clone(),
                 confidence: (main.confidence * r.weight).min(0.49),
@@ -454,7 +465,10 @@ pub fn of_logs(
                 visibility: of.visibility,
                 decoys: None,
                 unsteady: None,
-                values: effect.values(&cx, &r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
+                values: effect.values(
+                    &cx,
+                    &estimate(r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
+                ),
                 same: if r.weight > 0.25 {
                     vec![main.effect]
                 } else {
@@ -484,6 +498,8 @@ pub fn of_logs(
     if settings.next {
         progress("next experiment");
     }
+    let unknowns = &phi_after[..plant.parameters().len()];
+    let (improved, warnings) = improve::improve(&evidence, &cx, &effects, unknowns, &findings);
     let next = match settings.next {
         true => next::propose(&evidence, &cx, &effects, &list, &findings, settings),
         false => None,
@@ -505,10 +521,11 @@ pub fn of_logs(
         traces: traces(&data, &refit, &after),
         noise_source: noise_source.into(),
         untestable,
-        phi: phi_after[..plant.parameters().len()].to_vec(),
+        phi: unknowns.to_vec(),
+        improved,
         next,
         forward,
-        warnings: Vec::new(),
+        warnings,
         surprise: decision.surprise,
         closeness: data.closeness,
         window: data.window,
@@ -566,7 +583,8 @@ fn untestable(
     for c in list {
         let visibility = c.projected.visibility(None);
         if visibility < next::INVISIBLE {
-            let place: Vec<&str> = c.place.iter().map(|j| names[*j].name.as_str()).collect();
+            let named = c.place.named().into_iter();
+            let place: Vec<&str> = named.map(|j| names[j].name.as_str()).collect();
             out.push((effects[c.effect].card().name, place.join(", "), visibility));
         }
     }

@@ -1,6 +1,6 @@
 //! Search over effects, places and shapes.
 
-use super::catalogue::{Context, Effect};
+use super::catalogue::{Context, Effect, Place, Shape};
 use super::data::Column;
 use super::evidence::{Evidence, Fit, Projected};
 use rayon::prelude::*;
@@ -10,10 +10,10 @@ use rayon::prelude::*;
 pub struct Candidate {
     /// index into the catalogue
     pub effect: usize,
-    /// actuators
-    pub place: Vec<usize>,
-    /// shape constants
-    pub shape: Vec<f64>,
+    /// where
+    pub place: Place,
+    /// shape
+    pub shape: Shape,
     /// columns
     pub projected: Projected,
     /// by how much `J` falls when it is added to what is already there
@@ -23,10 +23,10 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Parameters that were fitted: coefficients of columns that are not zero, and shape constants.
-    pub fn freedoms(&self) -> usize {
+    /// Coefficients of columns that are not zero.
+    pub fn live(&self) -> usize {
         let live = (0..self.eta.len()).filter(|&k| self.projected.raw[(k, k)] > 0.0);
-        live.count() + self.shape.len()
+        live.count()
     }
 
     /// Whether it is the same effect at the same place.
@@ -41,8 +41,8 @@ fn try_shape(
     evidence: &Evidence,
     cx: &Context,
     effect: &dyn Effect,
-    place: &[usize],
-    shape: &[f64],
+    place: &Place,
+    shape: &Shape,
     beside: &[&Projected],
     before: &Fit,
     draft: bool,
@@ -70,20 +70,20 @@ pub fn best_shape(
     cx: &Context,
     effects: &[Box<dyn Effect>],
     which: usize,
-    place: &[usize],
+    place: &Place,
     beside: &[&Projected],
     before: &Fit,
 ) -> Option<Candidate> {
     let effect = effects[which].as_ref();
     let grid = effect.shapes(cx, place);
-    let best_of = |shapes: &[Vec<f64>]| -> Option<(f64, Vec<f64>)> {
-        let columns = |s: &Vec<f64>| effect.columns(cx, place, s, true);
+    let best_of = |shapes: &[Shape]| -> Option<(f64, Shape)> {
+        let columns = |s: &Shape| effect.columns(cx, place, s, true);
         let sets: Vec<_> = shapes.iter().map(columns).collect();
         let empty = |s: &Vec<Column>| s.is_empty() || s.iter().any(|c| c.rows.is_empty());
         if sets.iter().any(empty) {
             return None;
         }
-        let mut best: Option<(f64, Vec<f64>)> = None;
+        let mut best: Option<(f64, Shape)> = None;
         for (projected, shape) in evidence.project_all(&sets).iter().zip(shapes) {
             let mut set = beside.to_vec();
             set.push(projected);
@@ -100,16 +100,18 @@ pub fn best_shape(
         best
     };
     let parts: Vec<_> = grid.par_chunks(8).with_max_len(1).map(best_of).collect();
-    let better = |a: (f64, Vec<f64>), b: (f64, Vec<f64>)| if b.0 > a.0 { b } else { a };
+    let better = |a: (f64, Shape), b: (f64, Shape)| if b.0 > a.0 { b } else { a };
     let best = parts.into_iter().flatten().reduce(better);
     let (gain, mut shape) = best?;
     // between grid points
     if gain > 20.0 {
         let mut top = gain;
-        let bounds: Vec<[f64; 2]> = (0..shape.len())
+        let constants = shape.constants.len();
+        let bounds: Vec<[f64; 2]> = (0..constants)
             .map(|k| {
                 let ends = grid
                     .iter()
+                    .filter(|s| s.form == shape.form)
                     .map(|s| s[k])
                     .filter(|v| v.signum() == shape[k].signum());
                 ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
@@ -118,14 +120,14 @@ pub fn best_shape(
             })
             .collect();
         for step in [1.3f64, 1.12, 1.05] {
-            for k in 0..shape.len() {
+            for k in 0..constants {
                 if !effect.refinable(k) {
                     continue;
                 }
                 for factor in [step, 1.0 / step] {
                     loop {
                         let mut next = shape.clone();
-                        next[k] *= factor;
+                        next.constants[k] *= factor;
                         if next[k].abs() < bounds[k][0] / 1.5 || next[k].abs() > bounds[k][1] * 1.2
                         {
                             break;
@@ -148,7 +150,7 @@ pub fn best_shape(
         try_shape(evidence, cx, effect, place, &shape, beside, before, false)?;
     Some(Candidate {
         effect: which,
-        place: place.to_vec(),
+        place: *place,
         shape,
         projected,
         gain,
@@ -164,7 +166,7 @@ pub fn singles(
     beside: &[&Projected],
 ) -> Vec<Candidate> {
     let before = evidence.fit(beside);
-    let tasks: Vec<(usize, Vec<usize>)> = effects
+    let tasks: Vec<(usize, Place)> = effects
         .iter()
         .enumerate()
         .flat_map(|(e, effect)| effect.places(cx).into_iter().map(move |p| (e, p)))

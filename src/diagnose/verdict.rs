@@ -9,7 +9,7 @@
 //! 3. The confidence of a member is the product of what it explains of that which only it can explain on
 //!    its joints, of how that holds on holdout records, and of its share against its rivals.
 
-use super::catalogue::{Context, Effect};
+use super::catalogue::{Context, Effect, Place, Shape};
 use super::data::{Column, Data};
 use super::decoy;
 use super::evidence::{Evidence, Fit, Projected};
@@ -24,13 +24,13 @@ pub struct Rival {
     /// index into the catalogue
     pub effect: usize,
     /// where
-    pub place: Vec<usize>,
+    pub place: Place,
     /// share of the member's gain that it loses
     pub loss: f64,
     /// weight relative to the member
     pub weight: f64,
-    /// shape constants
-    pub shape: Vec<f64>,
+    /// shape
+    pub shape: Shape,
     /// coefficients
     pub eta: Vec<f64>,
 }
@@ -196,16 +196,13 @@ impl State<'_> {
     fn may_hide(&self, set: &[Candidate], i: usize) -> bool {
         let hides = |c: &Candidate| self.effects[c.effect].hides();
         let larger = |c: &Candidate| !hides(c) || c.gain > FAR * set[i].gain;
-        let shown = |c: &Candidate| larger(c) && c.place.iter().any(|j| set[i].place.contains(j));
+        let shown = |c: &Candidate| larger(c) && c.place.meets(&set[i].place);
         hides(&set[i]) && !set.iter().any(shown)
     }
 
     /// Joints on whose rows an effect acts most.
     fn joints_of(&self, c: &Candidate) -> Vec<usize> {
-        if c.place.is_empty() {
-            return (0..self.evidence.data.joints()).collect();
-        }
-        c.place.clone()
+        c.place.actuators(self.evidence.data.joints())
     }
 
     /// Whether an effect depends on what went on before a record began.
@@ -243,7 +240,7 @@ impl State<'_> {
             let others: Vec<Candidate> = others(set, i);
             let beside: Vec<&Projected> = others.iter().map(|c| &c.projected).collect();
             let before = self.evidence.fit(&beside);
-            let (effect, place) = (set[i].effect, set[i].place.clone());
+            let (effect, place) = (set[i].effect, set[i].place);
             let better = best_shape(
                 self.evidence,
                 self.cx,
@@ -350,22 +347,9 @@ impl State<'_> {
     }
 
     fn merit_of(&self, c: &Candidate, gain: f64, price: f64) -> f64 {
-        let name = self.effects[c.effect].card().name;
-        let freedoms = c.freedoms() as f64;
-        (gain - price * freedoms) * (1.0 + 0.01 * familiarity(name) - 0.003 * freedoms)
-    }
-}
-
-/// Effects that stand in every textbook model are likelier to be missing than others; wide families
-/// that imitate them are less likely.
-fn familiarity(name: &str) -> f64 {
-    match name {
-        "viscous_friction" | "coulomb_friction" | "rotor_inertia" => 3.0,
-        "torque_offset" => 2.0,
-        "payload" => 2.0,
-        "link_inertia" => -2.0,
-        "counterbalance" => -0.5,
-        _ => 0.0,
+        let effect = &self.effects[c.effect];
+        let freedoms = (c.live() + effect.freedoms(&c.shape)) as f64;
+        (gain - price * freedoms) * (1.0 + 0.01 * effect.familiarity() - 0.003 * freedoms)
     }
 }
 
@@ -681,7 +665,7 @@ fn judge(
         if loss < 0.98 {
             rivals.push(Rival {
                 effect: r.effect,
-                place: r.place.clone(),
+                place: r.place,
                 loss,
                 weight,
                 shape: r.shape.clone(),
@@ -840,9 +824,9 @@ fn unsteady(
 /// half of what the fit takes away there, as in [`predicts`]. 1 for other effects; little where one of the
 /// two joints is too noisy to tell, for then the effect may as well be another one on the other joint.
 fn shown_on_both(data: &Data, c: &Candidate, r0: &[Vec<f64>], r1: &[Vec<f64>]) -> f64 {
-    if c.place.len() < 2 {
+    let Place::Pair(j, k) = c.place else {
         return 1.0;
-    }
+    };
     let on = |j: usize| -> f64 {
         let [taken, fall] = taken_and_fall(&r0[j..=j], &r1[j..=j], 0..data.fitted);
         match taken < UNSEEN {
@@ -850,7 +834,7 @@ fn shown_on_both(data: &Data, c: &Candidate, r0: &[Vec<f64>], r1: &[Vec<f64>]) -
             false => logistic((fall / taken - HELD) / 0.05),
         }
     };
-    c.place.iter().map(|j| on(*j)).fold(1.0, f64::min)
+    on(j).min(on(k))
 }
 
 /// Effects that are the same thing by nature: an alias does not take confidence.

@@ -17,6 +17,7 @@ mod certify;
 mod follow;
 mod noise;
 mod torque;
+mod values;
 
 pub use crate::robot::{Column, Column as Kind, Parameter};
 pub use certify::Certified;

@@ -139,7 +139,7 @@ fn claims(d: &Diagnosis) -> Vec<(&str, Vec<usize>)> {
     d.findings
         .iter()
         .filter(|f| f.confidence >= 0.5)
-        .map(|f| (f.effect, f.place.clone()))
+        .map(|f| (f.effect, f.place.named()))
         .collect()
 }
 
@@ -277,7 +277,7 @@ fn the_wrist_of_a_real_arm_is_coupled() {
         return;
     };
     let f = &d.findings[0];
-    assert_eq!((f.effect, &f.place[..]), ("joint_coupling", &[4, 5][..]));
+    assert_eq!((f.effect, f.place.named()), ("joint_coupling", vec![4, 5]));
     assert!(f.confidence > 0.5, "{}", f.confidence);
     // published: 1.95 N m, 0.616 N m s, 0.00964 kg m²
     let value = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);

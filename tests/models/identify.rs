@@ -4,7 +4,7 @@ use crate::common::compare::largest;
 use crate::common::noise::normal;
 use crate::common::rng;
 use crate::common::shared::shared;
-use excite::identify::{Consistency, Identification, Method, Settings, identify, robot};
+use excite::identify::{Consistency, Identification, Method, Settings, identify};
 use excite::log::{Experiment, Payload, Purpose, Record};
 use excite::robot::JointTerm;
 use excite::{Plant, Robot};
@@ -427,7 +427,7 @@ fn bodies_stay_possible_when_the_data_are_poor() {
         };
         let id = identify(&plant, std::slice::from_ref(&r), &settings).unwrap();
         assert!(id.consistent, "{consistency:?} {:?}", id.margin);
-        let robot = robot::with_values(&plant, &id.phi);
+        let robot = plant.with_values(&id.phi);
         for b in &robot.bodies {
             let (smallest, violated) = b.inertia.realizability();
             assert!(

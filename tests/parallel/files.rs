@@ -507,7 +507,7 @@ fn motions_that_the_platform_cannot_do_are_refused() {
 /// Other values written to a robot file are the values that are read from it.
 #[test]
 fn an_identified_mechanism_is_written_and_read() {
-    use excite::identify::{mechanism, robot};
+    use excite::export::mechanism;
     use rand::Rng;
     let [hexapod, h4, delta] = ["hexapod", "h4", "delta"].map(|n| bundled::find(n).unwrap().toml);
     let terms = "identify = [\"armature\", \"viscous\", \"coulomb\", \"offset\"]";
@@ -546,7 +546,7 @@ fn an_identified_mechanism_is_written_and_read() {
                 p.value * *factor.entry(of).or_insert_with(|| r.random_range(0.8..1.2))
             })
             .collect();
-        let tree = robot::with_values(&plant, &phi);
+        let tree = plant.with_values(&phi);
         let toml = mechanism::toml(m, &tree, "robot.urdf").unwrap();
         let again = match Mechanism::from_toml_str(&toml, "robot.toml") {
             Ok(again) => again,
@@ -571,7 +571,7 @@ fn an_identified_mechanism_is_written_and_read() {
     let plant = Plant::from(bundled::find("delta").unwrap().load().unwrap());
     let mut phi = plant.values();
     phi[0] = -0.1;
-    let tree = robot::with_values(&plant, &phi);
+    let tree = plant.with_values(&phi);
     let m = plant.mechanism().unwrap();
     let e = mechanism::toml(m, &tree, "robot.urdf")
         .unwrap_err()

@@ -537,7 +537,7 @@ fn the_layout_of_example_parallel_robots_is_read() {
 /// Other values written to a robot file and its URDF are the values that are read from them.
 #[test]
 fn an_identified_tree_with_loops_is_written_and_read() {
-    use excite::identify::{mechanism, robot};
+    use excite::export::{Format, Model, mechanism, urdf::Urdf};
     use excite::plant::Plant;
     let frames = "lock = { pin = 0.0 }\nactuated = [\"motor_left\", \"motor_right\"]\n\
                   [[joint]]\nname = \"motor_left\"\nidentify = [\"armature\", \"coulomb\", \"offset\"]\n\
@@ -554,13 +554,19 @@ fn an_identified_tree_with_loops_is_written_and_read() {
         }
         phi[bodies..].iter_mut().for_each(|x| *x += 0.1);
         let m = plant.mechanism().unwrap();
-        let tree = robot::with_values(&plant, &phi);
+        let tree = plant.with_values(&phi);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("robot.toml");
         let toml = mechanism::toml(m, &tree, "identified.urdf").unwrap();
         println!("{toml}");
         std::fs::write(&path, &toml).unwrap();
-        std::fs::write(folder.path().join("identified.urdf"), robot::urdf(&tree)).unwrap();
+        let model = Model {
+            plant: &plant,
+            robot: &tree,
+            remarks: &[],
+        };
+        let urdf = Urdf.write(&model).unwrap();
+        std::fs::write(folder.path().join("identified.urdf"), urdf).unwrap();
         let again = Mechanism::load(path.to_str().unwrap()).unwrap().unwrap();
         assert_eq!(again.actuator_names(), m.actuator_names());
         assert_eq!(again.task_names, m.task_names);

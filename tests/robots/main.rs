@@ -4,6 +4,7 @@
 mod common;
 
 mod base;
+mod export;
 mod files;
 mod identities;
 mod plant;

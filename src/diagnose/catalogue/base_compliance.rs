@@ -17,18 +17,18 @@ impl Effect for BaseCompliance {
             separated_by: "the same pose with another moment on the base",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if cx.serial() {
-            vec![Vec::new()]
+            vec![Place::Robot]
         } else {
             Vec::new()
         }
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
         // natural frequency of the robot on its base, damping ratio
         [4.0, 6.0, 9.0, 13.0, 20.0, 40.0]
-            .map(|f| vec![f, 0.05])
+            .map(|f| Shape::of(&[f, 0.05]))
             .to_vec()
     }
 
@@ -36,35 +36,31 @@ impl Effect for BaseCompliance {
         k == 0
     }
 
-    fn rings(&self, _shape: &[f64]) -> bool {
+    fn rings(&self, _shape: &Shape) -> bool {
         true
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn columns(&self, cx: &Context, _place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let Some(load) = cx.base() else {
             return Vec::new();
         };
         tilted(cx, |r, k, axis| {
             let span = cx.data.span(k);
             let (moment, mass) = (&load.moment[axis][span.clone()], &load.mass[axis][span]);
-            backlash::fall(moment, mass, r.dt, 0.0, shape[0], shape[1], 0.0, r.cycle)
+            spring::way(moment, mass, r.dt, 0.0, shape[0], shape[1], 0.0, r.cycle)
         })
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, shape: &Shape, eta: &[f64]) -> bool {
         // a coefficient below 1 is a base that is heavy itself; one that swings slowly cannot be
         let largest = eta.iter().fold(0.0f64, |m, v| m.max(v.abs()));
         eta.iter().all(|t| *t > -0.3 * largest) && (largest > 0.4 || shape[0] > 25.0)
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        _place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            shape, eta, std, ..
+        } = e;
         let omega = 2.0 * std::f64::consts::PI * shape[0];
         let soft = |axis: usize| {
             let mass = cx.base().map_or(1.0, |b| {

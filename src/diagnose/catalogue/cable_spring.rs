@@ -5,6 +5,11 @@ use super::*;
 /// Cable or hose spring.
 pub struct CableSpring;
 
+/// A straight line.
+const LINEAR: u8 = 0;
+/// Up to the third power.
+const CUBIC: u8 = 1;
+
 impl Effect for CableSpring {
     fn card(&self) -> Card {
         Card {
@@ -20,49 +25,70 @@ impl Effect for CableSpring {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        vec![vec![1.0], vec![3.0]]
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        vec![Shape::new(LINEAR, &[]), Shape::new(CUBIC, &[])]
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn forms(&self) -> u8 {
+        2
+    }
+
+    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
+        let [a, b] = cx.data.range[e.place.first()];
+        let (middle, half) = (0.5 * (a + b), (0.5 * (b - a)).max(1e-9));
+        let stiffness = e.eta[1] / half;
+        // the joint pulls by −k (q − q₀), which the motor holds
+        (format == "MuJoCo" && stiffness != 0.0).then(|| {
+            format!(
+                "joint \"{}\": stiffness=\"{stiffness:.6}\" springref=\"{:.6}\"",
+                cx.name(e.place.first()),
+                middle - e.eta[0] / stiffness
+            )
+        })
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let [a, b] = cx.data.range[j];
         let (middle, half) = (0.5 * (a + b), (0.5 * (b - a)).max(1e-9));
-        (0..=shape[0] as i32)
+        let order = if shape.form == LINEAR { 1 } else { 3 };
+        (0..=order)
             .map(|p| Column::on(j, cx.data.own(j, |q, _| ((q - middle) / half).powi(p))))
             .collect()
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, shape: &Shape, eta: &[f64]) -> bool {
         // a spring: the pull changes over the range, it is no mere offset
         let varies = eta[1..].iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        varies > 0.15 * eta[0].abs() || shape[0] > 1.0
+        varies > 0.15 * eta[0].abs() || shape.form == CUBIC
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let j = place[0];
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let j = place.first();
         let [a, b] = cx.data.range[j];
         let half = (0.5 * (b - a)).max(1e-9);
-        let unit = match cx.motion(j) {
-            Motion::Revolute => "N m/rad",
-            Motion::Prismatic => "N/m",
-        };
+        let unit = cx.unit(j, Quantity::Stiffness);
         let mut all = vec![
-            value("stiffness", -eta[1] / half, std[1] / half, unit),
+            // what the motor holds against the spring grows by this much
+            value("stiffness", eta[1] / half, std[1] / half, unit),
             value("torque_at_middle", eta[0], std[0], cx.torque_unit(j)),
         ];
-        if shape[0] > 1.0 {
+        all.push(constant(
+            "middle",
+            0.5 * (a + b),
+            cx.unit(j, Quantity::Position),
+        ));
+        if shape.form == CUBIC {
             all.push(value("quadratic_part", eta[2], std[2], cx.torque_unit(j)));
             all.push(value("cubic_part", eta[3], std[3], cx.torque_unit(j)));
         }

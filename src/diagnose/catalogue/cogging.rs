@@ -16,37 +16,33 @@ impl Effect for Cogging {
             separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
-        super::cogging::orders(cx, place[0])
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        super::cogging::orders(cx, place.first())
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let (j, k) = (place[0], shape[0]);
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let (j, k) = (place.first(), shape[0]);
         vec![
             Column::on(j, cx.data.own(j, |q, _| (k * q).sin())),
             Column::on(j, cx.data.own(j, |q, _| (k * q).cos())),
         ]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.torque_unit(place[0]);
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.torque_unit(place.first());
         let scale = 1.0;
         let amplitude = eta[0].hypot(eta[1]);
-        let per = match cx.motion(place[0]) {
-            Motion::Revolute => "rad/rad",
-            Motion::Prismatic => "rad/m",
-        };
+        let per = cx.unit(place.first(), Quantity::Order);
         vec![
             value(
                 "amplitude",
@@ -67,14 +63,14 @@ impl Effect for Cogging {
 
 /// Orders `k N` of the motor turn that the records can tell apart from slower terms: whole multiples
 /// where the gear ratio is known, otherwise the orders at which the residual has its highest lines.
-pub(crate) fn orders(cx: &Context, j: usize) -> Vec<Vec<f64>> {
+pub(crate) fn orders(cx: &Context, j: usize) -> Vec<Shape> {
     let [a, b] = cx.data.range[j];
     let least = 4.0 * std::f64::consts::PI / (b - a).max(1e-9);
     if let Some(ratio) = cx.data.plant.actuators()[j].gear_ratio {
         return (1..=24)
             .map(|k| k as f64 * ratio.abs())
             .filter(|k| *k > least)
-            .map(|k| vec![k])
+            .map(|k| Shape::of(&[k]))
             .collect();
     }
     // residual of the model against position, line by line
@@ -102,5 +98,5 @@ pub(crate) fn orders(cx: &Context, j: usize) -> Vec<Vec<f64>> {
         .collect();
     lines.sort_by(|a, b| b.0.total_cmp(&a.0));
     lines.truncate(8);
-    lines.into_iter().map(|(_, k)| vec![k]).collect()
+    lines.into_iter().map(|(_, k)| Shape::of(&[k])).collect()
 }

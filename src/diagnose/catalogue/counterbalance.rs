@@ -20,7 +20,7 @@ impl Effect for Counterbalance {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if !cx.serial() {
             return Vec::new();
         }
@@ -28,12 +28,17 @@ impl Effect for Counterbalance {
         // only where weight acts
         (0..cx.data.joints())
             .filter(|j| cx.motion(*j) == Motion::Revolute && carries(cx, robot, *j))
-            .map(|j| vec![j])
+            .map(Place::Actuator)
             .collect()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn familiarity(&self) -> f64 {
+        // a wide family that imitates others
+        -0.5
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let of = |f: fn(f64) -> f64, k: f64| Column::on(j, cx.data.own(j, |q, _| f(k * q)));
         vec![
             of(f64::sin, 1.0),
@@ -43,15 +48,11 @@ impl Effect for Counterbalance {
         ]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.torque_unit(place[0]);
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place, eta, std, ..
+        } = e;
+        let unit = cx.torque_unit(place.first());
         let names = ["sine", "cosine", "sine_twice", "cosine_twice"];
         (0..4)
             .map(|k| value(names[k], eta[k], std[k], unit))

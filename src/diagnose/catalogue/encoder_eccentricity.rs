@@ -20,19 +20,19 @@ impl Effect for EncoderEccentricity {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if !cx.serial() {
             return Vec::new();
         }
         let turns = |j: &usize| cx.motion(*j) == Motion::Revolute;
         (0..cx.data.joints())
             .filter(turns)
-            .map(|j| vec![j])
+            .map(Place::Actuator)
             .collect()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let wave = |phase: f64| {
             cx.displaced(j, move |r, _| {
                 let (q, v) = r.state(j);
@@ -55,19 +55,15 @@ impl Effect for EncoderEccentricity {
         vec![wave(0.0), wave(std::f64::consts::FRAC_PI_2)]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0].hypot(eta[1]) < 0.12
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.position_unit(place[0]);
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place, eta, std, ..
+        } = e;
+        let unit = cx.unit(place.first(), Quantity::Position);
         vec![
             value("sine", eta[0], std[0], unit),
             value("cosine", eta[1], std[1], unit),

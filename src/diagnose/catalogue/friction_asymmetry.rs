@@ -16,21 +16,35 @@ impl Effect for FrictionAsymmetry {
             separated_by: "both directions through the same poses",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
-        let mut all = vec![vec![0.0]];
-        let v = cx.data.speed[place[0]];
-        all.extend(ladder(0.02 * v, 0.6 * v, 6).into_iter().map(|v| vec![v]));
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        // the difference of viscous friction alone, or with one that turns over at a velocity
+        let mut all = vec![Shape::new(0, &[])];
+        let v = cx.data.speed[place.first()];
+        all.extend(
+            ladder(0.02 * v, 0.6 * v, 6)
+                .into_iter()
+                .map(|v| Shape::new(1, &[v])),
+        );
         all
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn forms(&self) -> u8 {
+        2
+    }
+
+    fn freedoms(&self, _shape: &Shape) -> usize {
+        // the velocity, or that it takes no part
+        1
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let mut all = vec![Column::on(j, cx.data.own(j, |_, v| v.abs()))];
-        if shape[0] > 0.0 {
+        if shape.form == 1 {
             all.push(Column::on(
                 j,
                 cx.data.own(j, |_, v| 1.0 - (-v.abs() / shape[0]).exp()),
@@ -39,18 +53,14 @@ impl Effect for FrictionAsymmetry {
         all
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = match cx.motion(place[0]) {
-            Motion::Revolute => "N m s/rad",
-            Motion::Prismatic => "N s/m",
-        };
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.unit(place.first(), Quantity::Damping);
         // F_v^+ − F_v^−: half of it goes with |q̇|
         let mut all = vec![value(
             "viscous_difference",
@@ -58,18 +68,18 @@ impl Effect for FrictionAsymmetry {
             2.0 * std[0],
             unit,
         )];
-        if shape[0] > 0.0 {
+        if shape.form == 1 {
             let (e, s) = (eta[1], std[1]);
             all.push(value(
                 "coulomb_difference",
                 2.0 * e,
                 2.0 * s,
-                cx.torque_unit(place[0]),
+                cx.torque_unit(place.first()),
             ));
             all.push(constant(
                 "turnover_velocity",
                 shape[0],
-                cx.speed_unit(place[0]),
+                cx.unit(place.first(), Quantity::Speed),
             ));
         }
         all

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::dynamics::Tree;
-use crate::identify::robot::with_values;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 
 /// Gravity direction (base tilt).
 pub struct GravityDirection;
@@ -23,11 +22,18 @@ impl Effect for GravityDirection {
         true
     }
 
-    fn places(&self, _cx: &Context) -> Vec<Vec<usize>> {
-        vec![Vec::new()]
+    fn places(&self, _cx: &Context) -> Vec<Place> {
+        vec![Place::Robot]
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn apply(&self, _cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        // in axes of the base that tilted, gravity turns back
+        let back = -Vector3::new(e.eta[0], e.eta[1], 0.0);
+        robot.gravity = Rotation3::from_scaled_axis(back) * robot.gravity;
+        Some(Part::Gravity)
+    }
+
+    fn columns(&self, cx: &Context, _place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
         if !cx.serial() {
             return turned(cx).unwrap_or_default();
         }
@@ -36,18 +42,12 @@ impl Effect for GravityDirection {
         })
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta.iter().all(|t| t.abs() < 0.5)
     }
 
-    fn values(
-        &self,
-        _cx: &Context,
-        _place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, _cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate { eta, std, .. } = e;
         vec![
             value("tilt_x", eta[0], std[0], "rad"),
             value("tilt_y", eta[1], std[1], "rad"),
@@ -60,7 +60,7 @@ impl Effect for GravityDirection {
 fn turned(cx: &Context) -> Option<Vec<Column>> {
     let plant = cx.data.plant;
     let values = &cx.phi[..plant.parameters().len()];
-    let bodies = with_values(plant, values).bodies;
+    let bodies = plant.with_values(values).bodies;
     let phi: Vec<f64> = bodies.iter().flat_map(|b| b.inertia.0).collect();
     [Vector3::x(), Vector3::y()]
         .iter()

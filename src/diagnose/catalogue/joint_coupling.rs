@@ -16,23 +16,26 @@ impl Effect for JointCoupling {
             separated_by: "one of the two joints moved with the other still, and both with opposite speed",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         let n = cx.data.joints();
         if !cx.serial() {
             return Vec::new();
         }
         (1..n)
             .filter(|k| cx.motion(*k) == cx.motion(k - 1))
-            .map(|k| vec![k - 1, k])
+            .map(|k| Place::Pair(k - 1, k))
             .collect()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        vec![vec![1.0], vec![-1.0]]
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        vec![Shape::of(&[1.0]), Shape::of(&[-1.0])]
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let (j, k, s) = (place[0], place[1], shape[0]);
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let Place::Pair(j, k) = *place else {
+            return Vec::new();
+        };
+        let s = shape[0];
         let width = 1e-3 * (cx.data.speed[j] + cx.data.speed[k]);
         let sum = |r: &Record, of: fn(&Record, usize) -> Vec<f64>| -> Vec<f64> {
             of(r, j)
@@ -60,20 +63,19 @@ impl Effect for JointCoupling {
         ]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let [viscous, inertia] = match cx.motion(place[0]) {
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let [viscous, inertia] = match cx.motion(place.first()) {
             Motion::Revolute => ["N m s/rad", "kg m^2"],
             Motion::Prismatic => ["N s/m", "kg"],
         };
         vec![
-            value("coulomb", eta[0], std[0], cx.torque_unit(place[0])),
+            value("coulomb", eta[0], std[0], cx.torque_unit(place.first())),
             value("viscous", eta[1], std[1], viscous),
             value("inertia", eta[2], std[2], inertia),
             constant("ratio", shape[0], ""),

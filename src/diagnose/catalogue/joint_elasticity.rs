@@ -16,7 +16,7 @@ impl Effect for JointElasticity {
             separated_by: "high harmonics, a locked output, or a second encoder",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if cx.serial() {
             cx.singles()
         } else {
@@ -24,13 +24,13 @@ impl Effect for JointElasticity {
         }
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
         // natural frequency of the link on its spring, damping ratio, stiffening at the peak load
         let mut all = Vec::new();
         for frequency in [5.0, 7.0, 10.0, 14.0, 20.0, 30.0, 45.0] {
             for damping in [0.02, 0.08] {
                 for cubic in [0.0, 0.5] {
-                    all.push(vec![frequency, damping, cubic]);
+                    all.push(Shape::of(&[frequency, damping, cubic]));
                 }
             }
         }
@@ -41,16 +41,27 @@ impl Effect for JointElasticity {
         k < 2
     }
 
-    fn rings(&self, shape: &[f64]) -> bool {
+    fn rings(&self, shape: &Shape) -> bool {
         shape[1] > 0.08
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
+        let stiffness = self.values(cx, e).first()?.value;
+        let joint = cx.name(e.place.first());
+        (format == "MuJoCo").then(|| {
+            format!(
+                "joint \"{joint}\": split it into motor and link joint with stiffness=\"{stiffness:.6}\" \
+                 between them"
+            )
+        })
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
+        let j = place.first();
         let spring = |r: &Record, k: usize| {
             let span = cx.data.span(k);
             let (load, mass) = (&cx.rigid[j][span.clone()], &cx.mass[j][j][span]);
-            backlash::fall(load, mass, r.dt, 0.0, shape[0], shape[1], shape[2], r.cycle)
+            spring::way(load, mass, r.dt, 0.0, shape[0], shape[1], shape[2], r.cycle)
         };
         if draft {
             let mut all = Vec::with_capacity(cx.data.rows());
@@ -62,24 +73,20 @@ impl Effect for JointElasticity {
         vec![cx.displaced(j, spring)]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.4 && eta[0] < 2.0
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = match cx.motion(place[0]) {
-            Motion::Revolute => "N m/rad",
-            Motion::Prismatic => "N/m",
-        };
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.unit(place.first(), Quantity::Stiffness);
         // a coefficient that is not 1 is a twist that is larger: a softer spring
-        let j = place[0];
+        let j = place.first();
         let mass = cx.mass[j][j].iter().sum::<f64>() / cx.data.rows() as f64;
         let k = mass * (2.0 * std::f64::consts::PI * shape[0]).powi(2);
         vec![

@@ -22,25 +22,30 @@ impl Effect for LegInertia {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         match unknowns(cx).is_empty() {
             true => Vec::new(),
-            false => vec![Vec::new()],
+            false => vec![Place::Robot],
         }
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        for (u, eta) in unknowns(cx).iter().zip(&e.eta) {
+            for b in &u.bodies {
+                u.parts
+                    .iter()
+                    .for_each(|k| robot.bodies[*b].inertia.0[*k] += eta);
+            }
+        }
+        Some(Part::Bodies)
+    }
+
+    fn columns(&self, cx: &Context, _place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
         legs(cx).unwrap_or_default()
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        _place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate { eta, std, .. } = e;
         let unknowns = unknowns(cx);
         let numbers = eta.iter().zip(std);
         unknowns

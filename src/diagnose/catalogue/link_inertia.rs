@@ -5,6 +5,13 @@ use super::*;
 /// Link inertia error.
 pub struct LinkInertia;
 
+/// All ten parameters in proportion.
+const SHARE: u8 = 0;
+/// Mass and first moments.
+const POINT: u8 = 1;
+/// All ten parameters, each by itself.
+const WHOLE: u8 = 2;
+
 impl Effect for LinkInertia {
     fn card(&self) -> Card {
         Card {
@@ -20,7 +27,7 @@ impl Effect for LinkInertia {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if !cx.serial() {
             return Vec::new();
         }
@@ -29,39 +36,65 @@ impl Effect for LinkInertia {
             .robot()
             .bodies
             .iter()
-            .map(|b| vec![b.coordinate])
+            .map(|b| Place::Actuator(b.coordinate))
             .collect()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        // all ten parameters in proportion, a point mass, or all ten
-        vec![vec![1.0], vec![4.0], vec![10.0]]
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        [SHARE, POINT, WHOLE]
+            .map(|form| Shape::new(form, &[]))
+            .to_vec()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn forms(&self) -> u8 {
+        3
+    }
+
+    fn familiarity(&self) -> f64 {
+        // a wide family that imitates others
+        -2.0
+    }
+
+    fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        let nominal = &cx.data.plant.robot().bodies;
+        let b = nominal
+            .iter()
+            .position(|b| b.coordinate == e.place.first())?;
+        let more = match e.shape.form {
+            SHARE => Inertia(nominal[b].inertia.0.map(|x| e.eta[0] * x)),
+            _ => Inertia(std::array::from_fn(|k| {
+                e.eta.get(k).copied().unwrap_or(0.0)
+            })),
+        };
+        robot.bodies[b].inertia = robot.bodies[b].inertia + more;
+        Some(Part::Bodies)
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let robot = cx.data.plant.robot();
-        let body = robot.bodies.iter().position(|b| b.coordinate == place[0]);
-        body.map_or_else(Vec::new, |b| match shape[0] as usize {
-            1 => in_proportion(cx, b).into_iter().collect(),
-            count => body_columns(cx, b, count),
+        let body = robot
+            .bodies
+            .iter()
+            .position(|b| b.coordinate == place.first());
+        body.map_or_else(Vec::new, |b| match shape.form {
+            SHARE => in_proportion(cx, b).into_iter().collect(),
+            POINT => body_columns(cx, b, 4),
+            _ => body_columns(cx, b, 10),
         })
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let names = [
-            "m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz",
-        ];
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        use crate::robot::inertia::NAMES;
         let unit = |k: usize| crate::robot::inertia::UNITS[k];
-        if shape[0] == 1.0 {
+        if shape.form == SHARE {
             let robot = cx.data.plant.robot();
-            let body = robot.bodies.iter().find(|b| b.coordinate == place[0]);
+            let body = robot.bodies.iter().find(|b| b.coordinate == place.first());
             let m = body.map_or(0.0, |b| b.inertia.mass());
             return vec![
                 value("m", eta[0] * m, std[0] * m.abs(), unit(0)),
@@ -69,7 +102,7 @@ impl Effect for LinkInertia {
             ];
         }
         (0..eta.len())
-            .map(|k| value(names[k], eta[k], std[k], unit(k)))
+            .map(|k| value(NAMES[k], eta[k], std[k], unit(k)))
             .collect()
     }
 }

@@ -16,16 +16,16 @@ impl Effect for LoadDependentFriction {
             separated_by: "the same speed with two payloads",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        [0.7, 1.0, 1.4, 2.0].map(|e| vec![e]).to_vec()
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        [0.7, 1.0, 1.4, 2.0].map(|e| Shape::of(&[e])).to_vec()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let values = cx
             .sign(j)
             .iter()
@@ -35,22 +35,21 @@ impl Effect for LoadDependentFriction {
         vec![Column::on(j, values)]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.0
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.torque_unit(place[0]);
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.torque_unit(place.first());
         vec![
             value("torque_at_reference_load", eta[0], std[0], unit),
-            constant("reference_load", cx.peak[place[0]], unit),
+            constant("reference_load", cx.peak[place.first()], unit),
             constant("exponent", shape[0], ""),
         ]
     }

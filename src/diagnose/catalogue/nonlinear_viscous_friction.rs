@@ -16,42 +16,41 @@ impl Effect for NonlinearViscousFriction {
             separated_by: "constant speeds over the whole range",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
         [0.35, 0.5, 0.7, 1.35, 1.7, 2.0, 2.5, 3.0]
-            .map(|a| vec![a])
+            .map(|a| Shape::of(&[a]))
             .to_vec()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let top = cx.data.speed[j];
         let power = |v: f64| v.signum() * (v.abs() / top).powf(shape[0]);
         vec![Column::on(j, cx.data.own(j, |_, v| power(v)))]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
         vec![
             value(
                 "torque_at_reference_speed",
                 eta[0],
                 std[0],
-                cx.torque_unit(place[0]),
+                cx.torque_unit(place.first()),
             ),
             constant(
                 "reference_speed",
-                cx.data.speed[place[0]],
-                cx.speed_unit(place[0]),
+                cx.data.speed[place.first()],
+                cx.unit(place.first(), Quantity::Speed),
             ),
             constant("exponent", shape[0], ""),
         ]

@@ -16,25 +16,25 @@ impl Effect for PassiveJointFriction {
             separated_by: "rotations of the platform at constant leg speed",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if cx.serial() {
             Vec::new()
         } else {
-            vec![Vec::new()]
+            vec![Place::Robot]
         }
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let plant = cx.data.plant;
-        let names = plant.coordinate_names();
-        let passive: Vec<usize> = (0..plant.robot().dof())
-            .filter(|c| {
-                let joint = &plant.robot().joints[*c];
-                !plant.actuated().contains(c)
-                    && joint.motion == Motion::Revolute
-                    && !names.contains(&joint.name)
-            })
-            .collect();
+    fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        for c in passive(cx) {
+            let terms = &mut robot.joints[c].terms;
+            terms[JointTerm::Coulomb as usize] += e.eta[0];
+            terms[JointTerm::Viscous as usize] += e.eta[1];
+        }
+        Some(Part::Term(JointTerm::Coulomb))
+    }
+
+    fn columns(&self, cx: &Context, _place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
+        let passive = passive(cx);
         let friction = |law: &dyn Fn(f64, f64) -> f64| {
             projected(cx, |motion| {
                 let (tree, count) = (&motion.tree, motion.tree.count);
@@ -55,21 +55,29 @@ impl Effect for PassiveJointFriction {
         dry.into_iter().chain(viscous).collect()
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta.iter().sum::<f64>() > 0.0
     }
 
-    fn values(
-        &self,
-        _cx: &Context,
-        _place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, _cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate { eta, std, .. } = e;
         vec![
             value("coulomb", eta[0], std[0], "N m"),
             value("viscous", eta[1], std[1], "N m s/rad"),
         ]
     }
+}
+
+/// Coordinates that turn and that no motor drives.
+fn passive(cx: &Context) -> Vec<usize> {
+    let plant = cx.data.plant;
+    let names = plant.coordinate_names();
+    (0..plant.robot().dof())
+        .filter(|c| {
+            let joint = &plant.robot().joints[*c];
+            !plant.actuated().contains(c)
+                && joint.motion == Motion::Revolute
+                && !names.contains(&joint.name)
+        })
+        .collect()
 }

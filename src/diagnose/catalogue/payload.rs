@@ -5,6 +5,11 @@ use super::*;
 /// Payload.
 pub struct Payload;
 
+/// A point mass.
+const POINT: u8 = 0;
+/// With an inertia of its own.
+const BODY: u8 = 1;
+
 impl Effect for Payload {
     fn card(&self) -> Card {
         Card {
@@ -20,25 +25,46 @@ impl Effect for Payload {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         match (cx.serial(), cx.data.plant.robot().bodies.last()) {
-            (true, Some(last)) => vec![vec![last.coordinate]],
+            (true, Some(last)) => vec![Place::Actuator(last.coordinate)],
             (true, None) => Vec::new(),
             // the platform is moved by all actuators
-            (false, _) => vec![Vec::new()],
+            (false, _) => vec![Place::Robot],
         }
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        // a point mass, or with an inertia of its own
-        vec![vec![4.0], vec![10.0]]
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        vec![Shape::new(POINT, &[]), Shape::new(BODY, &[])]
     }
 
-    fn columns(&self, cx: &Context, _place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn forms(&self) -> u8 {
+        2
+    }
+
+    fn familiarity(&self) -> f64 {
+        2.0
+    }
+
+    fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        let b = cx.data.plant.tool()?;
+        let load = Inertia(std::array::from_fn(|k| {
+            e.eta.get(k).copied().unwrap_or(0.0)
+        }));
+        let load = match (e.shape.form, load.com()) {
+            // what was fitted is a mass and its moments; the inertia is that of a point
+            (POINT, Some(c)) => Inertia::from_com(load.mass(), c, Default::default()),
+            _ => load,
+        };
+        robot.bodies[b].inertia = robot.bodies[b].inertia + load;
+        Some(Part::Bodies)
+    }
+
+    fn columns(&self, cx: &Context, _place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let Some(body) = cx.data.plant.tool() else {
             return Vec::new();
         };
-        let count = shape[0] as usize;
+        let count = if shape.form == POINT { 4 } else { 10 };
         if cx.serial() {
             return link_inertia::body_columns(cx, body, count);
         }
@@ -51,19 +77,13 @@ impl Effect for Payload {
         (0..count).map_while(column).collect()
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         let reach = (eta[1].powi(2) + eta[2].powi(2) + eta[3].powi(2)).sqrt();
         eta[0] > 0.0 && reach < 0.8 * eta[0]
     }
 
-    fn values(
-        &self,
-        _cx: &Context,
-        _place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, _cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate { eta, std, .. } = e;
         let m = eta[0];
         let com = |k: usize| {
             let s = (std[k] / m).hypot(eta[k] * std[0] / (m * m));

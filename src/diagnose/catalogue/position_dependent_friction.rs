@@ -16,25 +16,25 @@ impl Effect for PositionDependentFriction {
             separated_by: "a slow full turn in both directions",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
-        let [a, b] = cx.data.range[place[0]];
-        match cx.motion(place[0]) {
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        let [a, b] = cx.data.range[place.first()];
+        match cx.motion(place.first()) {
             Motion::Revolute => [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0]
-                .map(|k| vec![k])
+                .map(|k| Shape::of(&[k]))
                 .to_vec(),
             Motion::Prismatic => ladder(1.5, 16.0, 7)
                 .into_iter()
-                .map(|k| vec![k / (b - a).max(1e-9)])
+                .map(|k| Shape::of(&[k / (b - a).max(1e-9)]))
                 .collect(),
         }
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let width = 1e-3 * cx.data.speed[j];
         let sign = |v: f64| crate::diagnose::data::sign(v, width);
         vec![
@@ -43,19 +43,15 @@ impl Effect for PositionDependentFriction {
         ]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.torque_unit(place[0]);
-        let per = match cx.motion(place[0]) {
-            Motion::Revolute => "rad/rad",
-            Motion::Prismatic => "rad/m",
-        };
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.torque_unit(place.first());
+        let per = cx.unit(place.first(), Quantity::Order);
         vec![
             value("sine", eta[0], std[0], unit),
             value("cosine", eta[1], std[1], unit),

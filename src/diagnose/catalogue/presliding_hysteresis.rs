@@ -16,29 +16,33 @@ impl Effect for PreslidingHysteresis {
             separated_by: "the same reversal at three speeds: a loop of constant width in position is hysteresis, in time a delay",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
-        let [a, b] = cx.data.range[place[0]];
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        let [a, b] = cx.data.range[place.first()];
         let grid = ladder(6e-4 * (b - a), 0.15 * (b - a), 9);
-        let with = |form: f64| grid.iter().map(move |s| vec![*s, form]);
-        with(0.0).chain(with(1.0)).chain(with(2.0)).collect()
+        let with = |form: u8| grid.iter().map(move |s| Shape::new(form, &[*s]));
+        (0..3).flat_map(with).collect()
     }
 
     fn refinable(&self, k: usize) -> bool {
         k == 0
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn forms(&self) -> u8 {
+        3
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let width = 1e-3 * cx.data.speed[j];
         let values = cx.data.each(|r, _| {
             let (q, v) = r.state(j);
             let a = r.acceleration(j);
             // the state of the last period is that of the first: run once to settle
-            let mut z = Bristles::new(shape[0], shape[1] as usize, q[0]);
+            let mut z = Bristles::new(shape[0], shape.form, q[0]);
             let settle = r.cycle.unwrap_or(0);
             for q in &q[..settle] {
                 z.step(*q);
@@ -53,21 +57,24 @@ impl Effect for PreslidingHysteresis {
         vec![Column::on(j, values)]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.0
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
         vec![
-            value("level", eta[0], std[0], cx.torque_unit(place[0])),
-            constant("presliding", shape[0], cx.position_unit(place[0])),
+            value("level", eta[0], std[0], cx.torque_unit(place.first())),
+            constant(
+                "presliding",
+                shape[0],
+                cx.unit(place.first(), Quantity::Position),
+            ),
         ]
     }
 }
@@ -77,13 +84,13 @@ struct Bristles {
     /// displacement over which it builds up
     reach: f64,
     /// 0 exponential (Dahl), 1 one spring that slips, 2 springs of many strengths
-    form: usize,
+    form: u8,
     at: f64,
     z: [f64; 8],
 }
 
 impl Bristles {
-    fn new(reach: f64, form: usize, at: f64) -> Self {
+    fn new(reach: f64, form: u8, at: f64) -> Self {
         Bristles {
             reach,
             form,

@@ -16,14 +16,14 @@ impl Effect for StribeckFriction {
             separated_by: "slow constant speeds below the Stribeck velocity",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
-        let v = cx.data.speed[place[0]];
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        let v = cx.data.speed[place.first()];
         let grid = ladder(0.006 * v, 0.2 * v, 9);
-        let with = |d: f64| grid.iter().map(move |v| vec![*v, d]);
+        let with = |d: f64| grid.iter().map(move |v| Shape::of(&[*v, d]));
         with(1.0).chain(with(2.0)).collect()
     }
 
@@ -31,8 +31,8 @@ impl Effect for StribeckFriction {
         k == 0
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let width = 1e-3 * cx.data.speed[j];
         let rise = |v: f64| {
             crate::diagnose::data::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
@@ -40,21 +40,24 @@ impl Effect for StribeckFriction {
         vec![Column::on(j, cx.data.own(j, |_, v| rise(v)))]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.0
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
         vec![
-            value("rise", eta[0], std[0], cx.torque_unit(place[0])),
-            constant("stribeck_velocity", shape[0], cx.speed_unit(place[0])),
+            value("rise", eta[0], std[0], cx.torque_unit(place.first())),
+            constant(
+                "stribeck_velocity",
+                shape[0],
+                cx.unit(place.first(), Quantity::Speed),
+            ),
             constant("exponent", shape[1], ""),
         ]
     }

@@ -5,6 +5,11 @@ use super::*;
 /// Thermal friction.
 pub struct ThermalFriction;
 
+/// Warmth lasts from record to record.
+const LASTS: u8 = 0;
+/// Every record begins cold.
+const COLD: u8 = 1;
+
 impl Effect for ThermalFriction {
     fn card(&self) -> Card {
         Card {
@@ -16,18 +21,18 @@ impl Effect for ThermalFriction {
             separated_by: "the same period repeated cold and warm",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        // time constant, whether warmth lasts over records, how far it saturates
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        // time constant, how far it saturates
         let mut all = Vec::new();
         for time in [5.0, 15.0, 40.0, 100.0, 300.0] {
             for bend in [0.0, 3.0, 8.0] {
-                all.push(vec![time, 1.0, bend]);
+                all.push(Shape::new(LASTS, &[time, bend]));
             }
-            all.push(vec![time, 0.0, 0.0]);
+            all.push(Shape::new(COLD, &[time, 0.0]));
         }
         all
     }
@@ -41,8 +46,12 @@ impl Effect for ThermalFriction {
         true
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn forms(&self) -> u8 {
+        2
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         // warmth from the power of friction; it lasts from record to record in the order of the
         // experiment, or every record starts cold
         let actuator = cx.data.plant.actuators()[j];
@@ -59,14 +68,14 @@ impl Effect for ThermalFriction {
         let mut warm = 0.0;
         for k in order {
             let r = &cx.data.records[k];
-            if shape[1] == 0.0 {
+            if shape.form == COLD {
                 warm = 0.0;
             }
             let (_, v) = r.state(j);
             for (to, v) in warmth[cx.data.span(k)].iter_mut().zip(v) {
                 warm += r.dt / shape[0] * (power(*v) - warm);
-                *to = match shape[2] > 0.0 {
-                    true => (1.0 - (-shape[2] * warm).exp()) / shape[2],
+                *to = match shape[1] > 0.0 {
+                    true => (1.0 - (-shape[1] * warm).exp()) / shape[1],
                     false => warm,
                 };
             }
@@ -78,23 +87,24 @@ impl Effect for ThermalFriction {
         ]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = match cx.motion(place[0]) {
-            Motion::Revolute => "N m s/rad",
-            Motion::Prismatic => "N s/m",
-        };
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.unit(place.first(), Quantity::Damping);
         vec![
-            value("coulomb_change", eta[0], std[0], cx.torque_unit(place[0])),
+            value(
+                "coulomb_change",
+                eta[0],
+                std[0],
+                cx.torque_unit(place.first()),
+            ),
             value("viscous_change", eta[1], std[1], unit),
             constant("time_constant", shape[0], "s"),
-            constant("lasts_over_records", shape[1], ""),
+            constant("lasts_over_records", f64::from(shape.form == LASTS), ""),
         ]
     }
 }

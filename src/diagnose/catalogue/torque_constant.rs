@@ -20,26 +20,25 @@ impl Effect for TorqueConstant {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        vec![Column::on(place[0], cx.model[place[0]].clone())]
+    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
+        let (joint, gain) = (cx.name(e.place.first()), 1.0 / (1.0 + e.eta[0]));
+        (format == "MuJoCo").then(|| format!("actuator \"{joint}\": gainprm=\"{gain:.6}\""))
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
+        vec![Column::on(place.first(), cx.model[place.first()].clone())]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0].abs() < 0.6
     }
 
-    fn values(
-        &self,
-        _cx: &Context,
-        _place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, _cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate { eta, std, .. } = e;
         vec![value("gain_error", eta[0], std[0], "")]
     }
 }

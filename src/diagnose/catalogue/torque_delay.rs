@@ -16,20 +16,20 @@ impl Effect for TorqueDelay {
             separated_by: "high frequencies; the same delay on all joints",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
-        let mut all = vec![Vec::new()];
+    fn places(&self, cx: &Context) -> Vec<Place> {
+        let mut all = vec![Place::Robot];
         if cx.data.joints() > 1 {
             all.extend(cx.singles());
         }
         all
     }
 
-    fn shapes(&self, cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
+    fn shapes(&self, cx: &Context, _place: &Place) -> Vec<Shape> {
         let dt = cx.data.records[0].dt;
-        let mut all: Vec<Vec<f64>> = Vec::new();
+        let mut all = Vec::new();
         for d in [0.4, 0.7, 1.0, 1.4, 2.0, 3.0] {
-            all.push(vec![d * dt]);
-            all.push(vec![-d * dt]);
+            all.push(Shape::of(&[d * dt]));
+            all.push(Shape::of(&[-d * dt]));
         }
         all
     }
@@ -38,9 +38,15 @@ impl Effect for TorqueDelay {
         true
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
+    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
+        let delay = self.values(cx, e).first()?.value;
+        (format == "MuJoCo")
+            .then(|| format!("actuators: delay of {delay:.6} s (dyntype filter or a buffer)"))
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let rows = (0..cx.data.joints())
-            .filter(|j| place.is_empty() || place.contains(j))
+            .filter(|j| place.includes(*j))
             .map(|j| {
                 let values = cx.data.each(|r, k| {
                     let x = &cx.model[j][cx.data.span(k)];
@@ -52,18 +58,14 @@ impl Effect for TorqueDelay {
         vec![Column { rows }]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.5 && eta[0] < 1.6
     }
 
-    fn values(
-        &self,
-        _cx: &Context,
-        _place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
+    fn values(&self, _cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            shape, eta, std, ..
+        } = e;
         vec![value(
             "delay",
             shape[0] * eta[0],

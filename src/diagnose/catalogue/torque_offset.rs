@@ -20,24 +20,28 @@ impl Effect for TorqueOffset {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.without(JointTerm::Offset)
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let values = vec![1.0; cx.data.rows()];
-        vec![Column::on(place[0], values)]
+    fn familiarity(&self) -> f64 {
+        2.0
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.torque_unit(place[0]);
+    fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        Some(joint_term(cx, e, robot, JointTerm::Offset))
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
+        let values = vec![1.0; cx.data.rows()];
+        vec![Column::on(place.first(), values)]
+    }
+
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place, eta, std, ..
+        } = e;
+        let unit = cx.torque_unit(place.first());
         vec![value("torque_offset", eta[0], std[0], unit)]
     }
 }

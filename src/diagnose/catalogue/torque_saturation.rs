@@ -5,6 +5,11 @@ use super::*;
 /// Saturation of the torque constant.
 pub struct TorqueSaturation;
 
+/// Loss grows with this power of the torque.
+const EXPONENT: u8 = 0;
+/// Loss beyond this share of the peak.
+const LIMIT: u8 = 1;
+
 impl Effect for TorqueSaturation {
     fn card(&self) -> Card {
         Card {
@@ -16,25 +21,36 @@ impl Effect for TorqueSaturation {
             separated_by: "high torques at low speed",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &[usize]) -> Vec<Vec<f64>> {
-        // above 1 an exponent, below 1 the limit as a share of the peak
-        [2.0, 3.0, 5.0, 0.4, 0.55, 0.7, 0.85]
-            .map(|e| vec![e])
-            .to_vec()
+    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
+        let with = |form: u8, all: &[f64]| -> Vec<Shape> {
+            all.iter().map(|c| Shape::new(form, &[*c])).collect()
+        };
+        let exponents = with(EXPONENT, &[2.0, 3.0, 5.0]);
+        let limits = with(LIMIT, &[0.4, 0.55, 0.7, 0.85]);
+        [exponents, limits].concat()
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], _draft: bool) -> Vec<Column> {
-        let j = place[0];
+    fn forms(&self) -> u8 {
+        2
+    }
+
+    fn freedoms(&self, _shape: &Shape) -> usize {
+        // the exponent or the limit
+        1
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        let j = place.first();
         let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));
         let values = cx.model[j]
             .iter()
             .map(|t| {
                 let x = t.abs() / peak;
-                let y = if shape[0] > 1.0 {
+                let y = if shape.form == EXPONENT {
                     x.powf(shape[0])
                 } else {
                     (x - shape[0]).max(0.0)
@@ -45,18 +61,17 @@ impl Effect for TorqueSaturation {
         vec![Column::on(j, values)]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let j = place[0];
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let j = place.first();
         let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));
         let mut all = vec![value("loss_at_peak", eta[0], std[0], "")];
-        if shape[0] > 1.0 {
+        if shape.form == EXPONENT {
             all.push(constant("exponent", shape[0], ""));
         } else {
             all.push(constant("limit", shape[0] * peak, cx.torque_unit(j)));

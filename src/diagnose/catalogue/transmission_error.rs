@@ -16,7 +16,7 @@ impl Effect for TransmissionError {
             separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         if cx.serial() {
             cx.singles()
         } else {
@@ -24,12 +24,12 @@ impl Effect for TransmissionError {
         }
     }
 
-    fn shapes(&self, cx: &Context, place: &[usize]) -> Vec<Vec<f64>> {
-        super::cogging::orders(cx, place[0])
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        super::cogging::orders(cx, place.first())
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], shape: &[f64], draft: bool) -> Vec<Column> {
-        let (j, k) = (place[0], shape[0]);
+    fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
+        let (j, k) = (place.first(), shape[0]);
         // second derivative of sin kq: k q̈ cos kq − k² q̇² sin kq; per 1/k² to keep numbers near 1
         let shaken = |phase: f64| {
             let mut all = Vec::with_capacity(cx.data.rows());
@@ -49,21 +49,17 @@ impl Effect for TransmissionError {
         vec![shaken(0.0), shaken(std::f64::consts::FRAC_PI_2)]
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = cx.position_unit(place[0]);
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place,
+            shape,
+            eta,
+            std,
+        } = e;
+        let unit = cx.unit(place.first(), Quantity::Position);
         let scale = 1.0 / (shape[0] * shape[0]);
         let amplitude = eta[0].hypot(eta[1]);
-        let per = match cx.motion(place[0]) {
-            Motion::Revolute => "rad/rad",
-            Motion::Prismatic => "rad/m",
-        };
+        let per = cx.unit(place.first(), Quantity::Order);
         vec![
             value(
                 "amplitude",

@@ -20,31 +20,32 @@ impl Effect for ViscousFriction {
         true
     }
 
-    fn places(&self, cx: &Context) -> Vec<Vec<usize>> {
+    fn places(&self, cx: &Context) -> Vec<Place> {
         cx.without(JointTerm::Viscous)
     }
 
-    fn columns(&self, cx: &Context, place: &[usize], _shape: &[f64], _draft: bool) -> Vec<Column> {
-        let values = cx.data.each(|r, _| smooth(r.state(place[0]).1));
-        vec![Column::on(place[0], values)]
+    fn familiarity(&self) -> f64 {
+        3.0
     }
 
-    fn plausible(&self, _cx: &Context, _place: &[usize], _shape: &[f64], eta: &[f64]) -> bool {
+    fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
+        Some(joint_term(cx, e, robot, JointTerm::Viscous))
+    }
+
+    fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
+        let values = cx.data.each(|r, _| smooth(r.state(place.first()).1));
+        vec![Column::on(place.first(), values)]
+    }
+
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.0
     }
 
-    fn values(
-        &self,
-        cx: &Context,
-        place: &[usize],
-        _shape: &[f64],
-        eta: &[f64],
-        std: &[f64],
-    ) -> Vec<Value> {
-        let unit = match cx.motion(place[0]) {
-            Motion::Revolute => "N m s/rad",
-            Motion::Prismatic => "N s/m",
-        };
+    fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
+        let Estimate {
+            place, eta, std, ..
+        } = e;
+        let unit = cx.unit(place.first(), Quantity::Damping);
         vec![value("viscous_friction", eta[0], std[0], unit)]
     }
 }

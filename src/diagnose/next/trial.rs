@@ -1,7 +1,7 @@
 //! A motion judged before it is run: how far it tells effects apart.
 
 use super::motions::PERIODS;
-use crate::diagnose::catalogue::{Context, Effect};
+use crate::diagnose::catalogue::{Context, Effect, Place, Shape};
 use crate::diagnose::data::Data;
 use crate::diagnose::evidence::{Evidence, Projected};
 use crate::diagnose::record::Record;
@@ -30,8 +30,8 @@ const SEEN: f64 = 0.05;
 /// An effect at a place, with its shape and, where they are known, its coefficients.
 pub(super) struct Placed<'a> {
     pub effect: &'a dyn Effect,
-    place: &'a [usize],
-    shape: &'a [f64],
+    place: &'a Place,
+    shape: &'a Shape,
     eta: Option<&'a [f64]>,
 }
 
@@ -58,12 +58,11 @@ impl<'a> Placed<'a> {
     /// Title and place, for sentences.
     pub fn words(&self, joints: &[String]) -> String {
         let title = self.effect.card().title;
-        match self.place.is_empty() {
+        let named = self.place.named().into_iter();
+        let names: Vec<&str> = named.map(|j| joints[j].as_str()).collect();
+        match names.is_empty() {
             true => title.to_string(),
-            false => {
-                let names: Vec<&str> = self.place.iter().map(|j| joints[*j].as_str()).collect();
-                format!("{title} on {}", names.join(" and "))
-            }
+            false => format!("{title} on {}", names.join(" and ")),
         }
     }
 
@@ -84,7 +83,7 @@ impl<'a> Placed<'a> {
         let grid = self.effect.shapes(cx, self.place);
         let stride = grid.len().div_ceil(most.max(2) - 1).max(1);
         let others = grid.into_iter().step_by(stride).filter(|s| s != self.shape);
-        let all = std::iter::once(self.shape.to_vec()).chain(others);
+        let all = std::iter::once(self.shape.clone()).chain(others);
         let sets: Vec<_> = all
             .enumerate()
             .map(|(i, s)| self.effect.columns(cx, self.place, &s, i > 0))

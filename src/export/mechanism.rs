@@ -1,8 +1,8 @@
 //! The identified parallel robot as a robot file: the file that it was read from with other bodies and
 //! joint terms, so that geometry, limits and unknowns stay as they were written. A tree with loops refers
-//! to the URDF of [`super::robot::urdf`].
+//! to the URDF of [`super::urdf`].
 
-use super::robot::{base_name, rpy};
+use super::{base_name, possible, rpy};
 use crate::error::{Error, Result};
 use crate::mechanism::loops::{Closure, Coincide, Frame};
 use crate::mechanism::{Mechanism, Source};
@@ -28,6 +28,9 @@ pub fn toml(mechanism: &Mechanism, robot: &Robot, urdf: &str) -> Result<String> 
         false => toml::from_str(&mechanism.text).map_err(|_| none())?,
     };
     file.insert("name".into(), robot.name.clone().into());
+    if robot.gravity != mechanism.robot.gravity {
+        file.insert("gravity".into(), numbers(robot.gravity.as_slice()));
+    }
     terms(&mut file, mechanism, robot);
     match &mechanism.platform().source {
         Source::GoughStewart => legs(&mut file, robot)?,
@@ -52,8 +55,12 @@ fn numbers(list: &[f64]) -> Value {
     Value::Array(list.iter().map(|&x| Value::Float(x)).collect())
 }
 
-/// `{ mass, com, inertia }`.
+/// `{ mass, com, inertia }` of a body that can exist.
 fn entry(name: &str, inertia: &Inertia) -> Result<Table> {
+    let inertia = match inertia.mass() > 0.0 {
+        true => &possible(inertia),
+        false => inertia,
+    };
     let mass = inertia.mass();
     let com = inertia.com().unwrap_or_default();
     if mass < 0.0 || (mass == 0.0 && inertia.first_moment() != Vector3::zeros()) {
@@ -147,7 +154,8 @@ fn legs(file: &mut Table, robot: &Robot) -> Result<()> {
         let shared = file.get("legs").and_then(Value::as_table);
         let described = shared.is_some_and(|t| t.contains_key(part))
             || tables(file, "leg").iter().any(|t| t.contains_key(part));
-        if !described {
+        let heavy = (1..=6).any(|k| inertia_of(robot, &format!("{part}{k}")) != Inertia::default());
+        if !described && !heavy {
             continue;
         }
         let body = |k: usize| {
@@ -166,6 +174,12 @@ fn chains(file: &mut Table, mechanism: &Mechanism, robot: &Robot) -> Result<()> 
     let lumped = model.is_some_and(|m| m.starts_with("lumped"));
     let body = |name: &str| {
         let own = inertia_of(robot, name);
+        if lumped && name == "platform" && own.first_moment() != Vector3::zeros() {
+            return Err(Error::Infeasible(format!(
+                "{name}: a lumped model has no place for its first moments {:?} kg m",
+                own.first_moment().as_slice()
+            )));
+        }
         let inertia = match (lumped, name.starts_with("arm"), name == "platform") {
             (true, true, _) => lumped_arm(&own),
             (true, _, true) => disc(own.0[0], own.0[9]),

@@ -1,0 +1,244 @@
+//! What columns of effects are computed from: the records, the nominal model as fitted, and its torques.
+
+use super::base_compliance;
+use super::estimate::{Place, Quantity};
+use crate::diagnose::data::{self, Column, Data, averaged};
+use crate::diagnose::record::Record;
+use crate::dynamics::Samples;
+use crate::mechanism::MechanismMotion;
+use crate::plant::Kind;
+use crate::robot::{JointTerm, Motion};
+use std::sync::OnceLock;
+
+/// State of the diagnosis that columns may depend on.
+pub struct Context<'a> {
+    /// the records
+    pub data: &'a Data<'a>,
+    /// parameters of the nominal model, as fitted
+    pub phi: Vec<f64>,
+    /// modelled torque by actuator, over all records
+    pub model: Vec<Vec<f64>>,
+    /// rigid-body part of it
+    pub rigid: Vec<Vec<f64>>,
+    /// largest rigid-body torque by actuator
+    pub peak: Vec<f64>,
+    /// column `j` of the mass matrix over all records: `mass[j][i]` is `M_ij` (serial robots)
+    pub mass: Vec<Vec<Vec<f64>>>,
+    /// what the robot exerts on its base, once it was asked for
+    base: OnceLock<Option<base_compliance::Load>>,
+}
+
+impl<'a> Context<'a> {
+    /// With parameters `phi` of the nominal model.
+    ///
+    /// # Errors
+    /// Poses that cannot be reached.
+    pub fn new(data: &'a Data<'a>, phi: Vec<f64>) -> crate::Result<Self> {
+        let model = data.model_torque(&phi);
+        let rigid = data.rigid_torque(&phi);
+        let peak = rigid
+            .iter()
+            .map(|r| r.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-9))
+            .collect();
+        let mut mass = Vec::new();
+        if data.plant.mechanism().is_none() {
+            for j in 0..data.joints() {
+                let more = data.torque_of(&phi, |r, _, x| {
+                    x.qdd[j * r.count..(j + 1) * r.count]
+                        .iter_mut()
+                        .for_each(|a| *a += 1.0);
+                })?;
+                let column = more
+                    .iter()
+                    .zip(&rigid)
+                    .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
+                    .collect();
+                mass.push(column);
+            }
+        }
+        Ok(Context {
+            data,
+            phi,
+            model,
+            rigid,
+            peak,
+            mass,
+            base: OnceLock::new(),
+        })
+    }
+
+    /// What the robot exerts on its base (serial robots).
+    pub(crate) fn base(&self) -> Option<&base_compliance::Load> {
+        self.base
+            .get_or_init(|| base_compliance::Load::of(self))
+            .as_ref()
+    }
+
+    /// Every actuator by itself.
+    pub fn singles(&self) -> Vec<Place> {
+        (0..self.data.joints()).map(Place::Actuator).collect()
+    }
+
+    /// Whether it is a serial robot.
+    pub fn serial(&self) -> bool {
+        self.data.plant.mechanism().is_none()
+    }
+
+    /// Actuators whose nominal model has no unknown of this kind.
+    pub fn without(&self, term: JointTerm) -> Vec<Place> {
+        let actuated = self.data.plant.actuated();
+        self.singles()
+            .into_iter()
+            .filter(|place| {
+                let joint = actuated[place.first()];
+                !self
+                    .data
+                    .parameters
+                    .iter()
+                    .any(|p| p.kind == Kind::Term { joint, term })
+            })
+            .collect()
+    }
+
+    /// Kind of motion of an actuator.
+    pub fn motion(&self, j: usize) -> Motion {
+        self.data.plant.actuators()[j].motion
+    }
+
+    /// Name of an actuator.
+    pub fn name(&self, j: usize) -> &str {
+        &self.data.plant.actuators()[j].name
+    }
+
+    /// Unit of a quantity of an actuator.
+    pub fn unit(&self, j: usize, quantity: Quantity) -> &'static str {
+        quantity.unit(self.motion(j))
+    }
+
+    /// Unit of the torque of an actuator.
+    pub fn torque_unit(&self, j: usize) -> &'static str {
+        self.unit(j, Quantity::Torque)
+    }
+
+    /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
+    pub fn sign(&self, j: usize) -> Vec<f64> {
+        let width = 1e-3 * self.data.speed[j];
+        self.data.own(j, |_, v| data::sign(v, width))
+    }
+
+    /// Change of the rigid-body torque of all actuators when coordinate `j` moves by a small `δ`
+    /// more: `∂τ/∂(q_j, q̇_j, q̈_j) (δ, δ̇, δ̈)`. `delta` gives `(δ, δ̇, δ̈)` of a record, sample by
+    /// sample.
+    pub fn displaced(
+        &self,
+        j: usize,
+        delta: impl Fn(&Record, usize) -> [Vec<f64>; 3] + Sync,
+    ) -> Column {
+        let n = self.data.joints();
+        let side = |sign: f64| {
+            self.data.torque_of(&self.phi, |r, k, x: &mut Samples| {
+                let d = delta(r, k);
+                let largest = d[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
+                let step = sign * 1e-4 / largest;
+                let row = j * r.count..(j + 1) * r.count;
+                for (to, from) in [&mut x.q, &mut x.qd, &mut x.qdd].into_iter().zip(&d) {
+                    for (x, v) in to[row.clone()].iter_mut().zip(from) {
+                        *x += step * v;
+                    }
+                }
+            })
+        };
+        let (Ok(plus), Ok(minus)) = (side(1.0), side(-1.0)) else {
+            return Column::default();
+        };
+        let rows = (0..n)
+            .map(|i| {
+                let mut out = Vec::with_capacity(self.data.rows());
+                for (k, r) in self.data.records.iter().enumerate() {
+                    let d = delta(r, k);
+                    let largest = d[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
+                    let step = 2e-4 / largest;
+                    let span = self.data.span(k);
+                    out.extend(
+                        plus[i][span.clone()]
+                            .iter()
+                            .zip(&minus[i][span])
+                            .map(|(a, b)| (a - b) / step),
+                    );
+                }
+                (i, out)
+            })
+            .collect();
+        prune(Column { rows })
+    }
+
+    /// `M_ij δ̈` on the rows of all actuators for an acceleration `δ̈` of coordinate `j` given on all
+    /// samples (or only on the row of `j`).
+    pub fn inertial(&self, j: usize, acceleration: &[f64], own_only: bool) -> Column {
+        let rows = (0..self.data.joints())
+            .filter(|i| !own_only || *i == j)
+            .map(|i| {
+                let values = self.mass[j][i]
+                    .iter()
+                    .zip(acceleration)
+                    .map(|(m, a)| m * a)
+                    .collect();
+                (i, values)
+            })
+            .collect();
+        prune(Column { rows })
+    }
+}
+
+/// Actuator forces of a closed chain whose tree has the inertial parameters `phi` (ten a body) and
+/// nothing else, `Gᵀ Y_tree φ`; `None` for a serial robot and poses that cannot be reached.
+pub(crate) fn closed_column(cx: &Context, phi: &[f64]) -> Option<Column> {
+    projected(cx, |motion| {
+        let mut gamma = vec![0.0; motion.tree.dof * motion.tree.count];
+        let tree = cx.data.plant.tree();
+        tree.inverse_dynamics(&mut Default::default(), phi, &motion.tree, &mut gamma);
+        gamma
+    })
+}
+
+/// Generalised forces of the joints of the tree, record by record, as the actuators of a closed
+/// chain feel them: `Gᵀ Γ`.
+pub(crate) fn projected(
+    cx: &Context,
+    gamma: impl Fn(&MechanismMotion) -> Vec<f64>,
+) -> Option<Column> {
+    let mechanism = cx.data.plant.mechanism()?;
+    let mut rows = vec![Vec::with_capacity(cx.data.rows()); cx.data.joints()];
+    for r in &cx.data.records {
+        let motion = mechanism.motion(&r.x).ok()?;
+        let tau = mechanism.project(&motion, &gamma(&motion));
+        for (row, tau) in rows.iter_mut().zip(tau.chunks_exact(r.count)) {
+            row.extend(smooth(tau));
+        }
+    }
+    Some(Column {
+        rows: rows.into_iter().enumerate().collect(),
+    })
+}
+
+/// Without rows that are zero throughout.
+pub(crate) fn prune(mut column: Column) -> Column {
+    column
+        .rows
+        .retain(|(_, v)| v.iter().any(|x| x.abs() > 1e-12));
+    column
+}
+
+/// Average as torque is measured.
+pub(crate) fn smooth(x: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; x.len()];
+    averaged(x, &mut out);
+    out
+}
+
+/// `count` numbers from `a` to `b` in equal ratios.
+pub(crate) fn ladder(a: f64, b: f64, count: usize) -> Vec<f64> {
+    (0..count)
+        .map(|i| a * (b / a).powf(i as f64 / (count - 1) as f64))
+        .collect()
+}

@@ -1,0 +1,73 @@
+//! A mass on springs, with or without a gap between them.
+
+use crate::diagnose::data::{FINE, from_fine};
+
+/// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J`, where `T`
+/// is the torque of flanks at `±b/2` with springs of `M (2πf)²` and a damping ratio; the springs
+/// stiffen by `cubic` at the largest load. Averaged as torque is measured.
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn way(
+    load: &[f64],
+    mass: &[f64],
+    dt: f64,
+    gap: f64,
+    frequency: f64,
+    damping: f64,
+    cubic: f64,
+    cycle: Option<usize>,
+) -> [Vec<f64>; 3] {
+    let omega = 2.0 * std::f64::consts::PI * frequency;
+    let n = load.len();
+    // sub-steps of the springs, finer than those of the average
+    let sub = ((omega * dt / FINE as f64 / 0.2).ceil() as usize).max(1);
+    let h = dt / (FINE * sub) as f64;
+    let mean = mass.iter().sum::<f64>() / n as f64;
+    let k = mean * omega * omega;
+    let d = 2.0 * damping * mean * omega;
+    let twist = load.iter().fold(1e-12f64, |m, v| m.max(v.abs())) / k;
+    let (mut x, mut v) = (-gap / 2.0 * load[0].signum() - load[0] / k, 0.0);
+    let mut values: [Vec<f64>; 3] = Default::default();
+    let settle = cycle.unwrap_or(0).min(n - 1);
+    for pass in 0..2 {
+        let upto = if pass == 0 { settle } else { n };
+        for i in 0..upto {
+            let next = (i + 1).min(n - 1);
+            let m = mass[i].max(0.05 * mean);
+            for s in 0..FINE {
+                let mut sum = 0.0;
+                let begin = (x, v);
+                for u in 0..sub {
+                    let w = (s * sub + u) as f64 / (FINE * sub) as f64;
+                    let tau = load[i] + w * (load[next] - load[i]);
+                    let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
+                    let mut t = -k * beyond * (1.0 + cubic * (beyond / twist).powi(2).min(9.0));
+                    // flanks push only while they touch
+                    if gap == 0.0 {
+                        t -= d * v;
+                    } else if beyond != 0.0 {
+                        let damped = t - d * v;
+                        t = if damped * t > 0.0 { damped } else { 0.0 };
+                    }
+                    let a = (t - tau) / m;
+                    sum += a;
+                    v += h * a;
+                    x += h * v;
+                }
+                if pass == 1 {
+                    values[0].push(begin.0);
+                    values[1].push(begin.1);
+                    values[2].push(sum / sub as f64);
+                }
+                if pass == 1 && i + 1 == n {
+                    break;
+                }
+            }
+        }
+    }
+    values.map(|mut all| {
+        all.truncate((n - 1) * FINE + 1);
+        let mut out = Vec::with_capacity(n);
+        from_fine(&all, n, &mut out);
+        out
+    })
+}

@@ -1,0 +1,206 @@
+//! Models as files: one writer a format.
+//!
+//! | file | module | holds | robots |
+//! |---|---|---|---|
+//! | `robot.urdf` | [`urdf`] | tree, inertia, limits, viscous and Coulomb friction | all |
+//! | `robot.xml` | [`mujoco`] | the same for MuJoCo, rotor inertia, gravity | serial |
+//! | `robot.toml` | [`robot_toml`], [`mechanism`] | what the other commands read, geometry and loops included | all |
+//!
+//! A new format is one file with an implementation of [`Format`], and one line in [`FORMATS`]. What a model
+//! has and a format cannot hold stands in it as a comment ([`Remark`]). The bodies that are written can
+//! exist: masses are positive and principal moments fulfil the triangle inequality ([`possible`]).
+
+pub mod mechanism;
+pub mod mujoco;
+pub mod remark;
+pub mod robot_toml;
+pub mod urdf;
+
+pub use remark::Remark;
+
+use crate::error::{Result, Warning, WarningKind};
+use crate::plant::{Column, Plant};
+use crate::robot::{Inertia, JointTerm, Robot};
+use nalgebra::{Matrix3, Rotation3, SymmetricEigen, Vector3};
+
+/// A model to be written.
+#[derive(Debug, Clone, Copy)]
+pub struct Model<'a> {
+    /// the robot that it is a model of: geometry, loops, the file it was read from
+    pub plant: &'a Plant,
+    /// its bodies and joints with the values to be written
+    pub robot: &'a Robot,
+    /// what the bodies and joints cannot hold
+    pub remarks: &'a [Remark],
+}
+
+/// A part of a model, in which an effect may be held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// inertia of bodies
+    Bodies,
+    /// a term of joints
+    Term(JointTerm),
+    /// acceleration of gravity
+    Gravity,
+    /// where the frames of bodies are
+    Frames,
+}
+
+/// A file format.
+pub trait Format: Sync {
+    /// Name, by which effects know it.
+    fn name(&self) -> &'static str;
+    /// Name of the file.
+    fn file(&self) -> &'static str;
+    /// Whether it can hold robots of this kind.
+    fn holds(&self, _plant: &Plant) -> bool {
+        true
+    }
+    /// Whether it has this part of a model.
+    fn has(&self, part: Part) -> bool;
+    /// Text of the file.
+    ///
+    /// # Errors
+    /// A model that it cannot hold.
+    fn write(&self, model: &Model) -> Result<String>;
+}
+
+/// All formats.
+pub const FORMATS: [&dyn Format; 3] = [&urdf::Urdf, &mujoco::Mujoco, &robot_toml::RobotToml];
+
+/// Names of the files that a robot of this kind is written to.
+pub fn files(plant: &Plant) -> Vec<&'static str> {
+    let held = FORMATS.iter().filter(|f| f.holds(plant));
+    held.map(|f| f.file()).collect()
+}
+
+/// Every file of a model, in the order of [`files`], with its text or why there is none.
+pub fn write(model: &Model) -> Vec<(&'static str, Result<String>)> {
+    let held = FORMATS.iter().filter(|f| f.holds(model.plant));
+    held.map(|f| (f.file(), f.write(model))).collect()
+}
+
+impl Model<'_> {
+    /// Bodies whose values are not those of a body that can exist, for which the nearest is written.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let all = impossible(self.plant, self.robot).into_iter();
+        let one = |b: usize| {
+            Warning::new(
+                WarningKind::InertiaImpossible,
+                self.robot.bodies[b].name.clone(),
+                "its values are not those of a body that can exist; the nearest one that can is in the \
+                 robot files",
+            )
+        };
+        all.map(one).collect()
+    }
+}
+
+/// Bodies of a robot whose values are not those of a body that can exist. Bodies of which the plant
+/// knows a part of the ten parameters only stand for no body and are left out.
+pub fn impossible(plant: &Plant, robot: &Robot) -> Vec<usize> {
+    let raw = plant.raw();
+    let own = |b: usize, c: &Column| matches!(c, Column::Inertial { body, .. } if *body == b);
+    // raw columns that an unknown stands for; of a body that is known there are none
+    let unknown = |b: usize, wanted: usize| {
+        let at = raw
+            .iter()
+            .position(|c| *c == Column::Inertial { body: b, k: wanted });
+        at.is_some_and(|at| plant.parameters().iter().any(|p| p.raw.contains(&at)))
+    };
+    let whole = |b: &usize| {
+        let known = !raw.iter().any(|c| own(*b, c));
+        known || [0, 4, 7, 9].iter().all(|k| unknown(*b, *k))
+    };
+    let able = |b: &usize| {
+        let inertia = &robot.bodies[*b].inertia;
+        possible(inertia) == *inertia
+    };
+    (0..robot.bodies.len())
+        .filter(whole)
+        .filter(|b| !able(b))
+        .collect()
+}
+
+/// Least principal second moment of mass of a body as a share of the largest, where it had to be moved.
+const LEAST: f64 = 1e-6;
+/// Part of the largest second moment by which rounding may make another negative.
+const ROUNDING: f64 = 1e-9;
+
+/// The nearest body that can exist: the same where it can, otherwise with the same mass and centre and
+/// with the negative second moments about it raised to zero, where `Σ_c = ½ tr(I_c) 1 − I_c` (the
+/// triangle inequality of the principal moments is `Σ_c ⪰ 0`; Wensing, Kim & Slotine 2018). A body of
+/// negative mass becomes one of a milligram at its origin. One without mass stays as it is.
+pub fn possible(inertia: &Inertia) -> Inertia {
+    if inertia.mass() < 0.0 {
+        return bounded(
+            &Inertia([1e-6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            LEAST,
+            1e-12,
+        );
+    }
+    let e = second_moments(inertia).eigenvalues;
+    match inertia.mass() == 0.0 || e.min() >= -ROUNDING * e.max().abs() {
+        true => *inertia,
+        false => bounded(inertia, LEAST, 0.0),
+    }
+}
+
+fn second_moments(inertia: &Inertia) -> SymmetricEigen<f64, nalgebra::U3> {
+    let tensor = inertia.tensor_com();
+    (Matrix3::identity() * (0.5 * tensor.trace()) - tensor).symmetric_eigen()
+}
+
+/// A body with second moments about its centre of at least `share` of the largest and at least `least`,
+/// kg m²; the same where it has them.
+pub(crate) fn bounded(inertia: &Inertia, share: f64, least: f64) -> Inertia {
+    let mut e = second_moments(inertia);
+    let floor = (share * e.eigenvalues.max()).max(least);
+    if e.eigenvalues.min() >= floor {
+        return *inertia;
+    }
+    e.eigenvalues.iter_mut().for_each(|x| *x = x.max(floor));
+    let sigma = e.recompose();
+    let tensor = Matrix3::identity() * sigma.trace() - sigma;
+    let tensor = 0.5 * (tensor + tensor.transpose());
+    Inertia::from_com(
+        inertia.mass(),
+        inertia.com().unwrap_or_else(Vector3::zeros),
+        tensor,
+    )
+}
+
+/// Text that may stand in an XML attribute.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('"', "&quot;")
+}
+
+/// Lines as an XML comment; none without lines.
+fn xml_comment(lines: &[String]) -> String {
+    match lines.is_empty() {
+        true => String::new(),
+        // two hyphens may not stand in a comment
+        false => format!("<!--\n  {}\n-->\n", lines.join("\n  ").replace("--", "- -")),
+    }
+}
+
+/// Roll, pitch and yaw of a rotation.
+fn rpy(r: &Matrix3<f64>) -> [f64; 3] {
+    let (roll, pitch, yaw) = Rotation3::from_matrix_unchecked(*r).euler_angles();
+    [roll, pitch, yaw]
+}
+
+/// A name for the base that no link has.
+fn base_name(robot: &Robot) -> String {
+    let mut name = String::from("base");
+    while robot.bodies.iter().any(|b| b.name == name) {
+        name.push('_');
+    }
+    name
+}
+
+#[cfg(test)]
+mod tests;

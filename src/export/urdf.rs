@@ -1,0 +1,130 @@
+//! The Unified Robot Description Format. Friction stands in `<dynamics>`; rotor inertia, offset and gravity
+//! have no place there.
+
+use super::{Format, Model, Part, base_name, escape, possible, remark, rpy, xml_comment};
+use crate::error::Result;
+use crate::robot::{JointTerm, Motion, Robot};
+use std::fmt::Write;
+
+/// Name of the file, which `robot.toml` refers to.
+pub const FILE: &str = "robot.urdf";
+
+/// URDF.
+pub struct Urdf;
+
+impl Format for Urdf {
+    fn name(&self) -> &'static str {
+        "URDF"
+    }
+
+    fn file(&self) -> &'static str {
+        FILE
+    }
+
+    fn has(&self, part: Part) -> bool {
+        match part {
+            Part::Bodies | Part::Frames => true,
+            Part::Term(term) => matches!(term, JointTerm::Viscous | JointTerm::Coulomb),
+            Part::Gravity => false,
+        }
+    }
+
+    fn write(&self, model: &Model) -> Result<String> {
+        let comment = xml_comment(&remark::lines(model.remarks, self));
+        Ok(format!(
+            "<?xml version=\"1.0\"?>\n{comment}{}",
+            urdf(model.robot)
+        ))
+    }
+}
+
+/// The robot as URDF.
+fn urdf(robot: &Robot) -> String {
+    let mut out = String::new();
+    let base = base_name(robot);
+    let _ = writeln!(out, "<robot name=\"{}\">", escape(&robot.name));
+    let _ = writeln!(out, "  <link name=\"{base}\"/>");
+    for body in &robot.bodies {
+        let _ = writeln!(out, "  <link name=\"{}\">", escape(&body.name));
+        let inertia = possible(&body.inertia);
+        if let Some(c) = inertia.com() {
+            let i = inertia.tensor_com();
+            let _ = writeln!(
+                out,
+                "    <inertial>\n      <origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
+                 <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>\n    </inertial>",
+                c.x,
+                c.y,
+                c.z,
+                inertia.mass(),
+                i.m11,
+                i.m12,
+                i.m13,
+                i.m22,
+                i.m23,
+                i.m33
+            );
+        }
+        out.push_str("  </link>\n");
+        let joint = &robot.joints[body.coordinate];
+        let limits = &joint.limits;
+        let bounded = limits.position.iter().all(|x| x.is_finite());
+        let kind = match (body.motion, bounded) {
+            (Motion::Prismatic, _) => "prismatic",
+            (Motion::Revolute, true) => "revolute",
+            (Motion::Revolute, false) => "continuous",
+        };
+        let parent = body.parent.map_or(base.as_str(), |p| &robot.bodies[p].name);
+        let [roll, pitch, yaw] = rpy(&body.rotation);
+        let p = body.position;
+        let _ = writeln!(
+            out,
+            "  <joint name=\"{}\" type=\"{kind}\">\n    <origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>\n    \
+             <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n    <axis xyz=\"{} {} {}\"/>",
+            escape(&body.joint_name),
+            p.x,
+            p.y,
+            p.z,
+            escape(parent),
+            escape(&body.name),
+            body.axis.x,
+            body.axis.y,
+            body.axis.z
+        );
+        let mut limit = String::new();
+        if bounded {
+            let _ = write!(
+                limit,
+                " lower=\"{}\" upper=\"{}\"",
+                limits.position[0], limits.position[1]
+            );
+        }
+        for (name, x) in [("velocity", limits.velocity), ("effort", limits.effort)] {
+            if x.is_finite() {
+                let _ = write!(limit, " {name}=\"{x}\"");
+            }
+        }
+        if !limit.is_empty() {
+            let _ = writeln!(out, "    <limit{limit}/>");
+        }
+        if body.joint_name == joint.name {
+            let _ = writeln!(
+                out,
+                "    <dynamics damping=\"{}\" friction=\"{}\"/>",
+                joint.terms[JointTerm::Viscous as usize].max(0.0),
+                joint.terms[JointTerm::Coulomb as usize].max(0.0)
+            );
+        } else {
+            let _ = writeln!(
+                out,
+                "    <mimic joint=\"{}\" multiplier=\"{}\" offset=\"{}\"/>",
+                escape(&joint.name),
+                body.ratio,
+                body.offset
+            );
+        }
+        out.push_str("  </joint>\n");
+    }
+    out.push_str("</robot>\n");
+    out
+}
