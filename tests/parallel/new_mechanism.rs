@@ -245,7 +245,7 @@ fn a_mechanism_of_user_code_is_not_written_as_another_kind() {
     let mut m = five_bar().unwrap();
     // as if it had been read from a file
     m.text = "mechanism = \"loops\"".into();
-    let error = excite::identify::mechanism::toml(&m, &m.robot, "five_bar.urdf").unwrap_err();
+    let error = excite::export::mechanism::toml(&m, &m.robot, "five_bar.urdf").unwrap_err();
     assert!(error.to_string().contains("five-bar"), "{error}");
 }
 

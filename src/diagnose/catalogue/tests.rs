@@ -5,6 +5,7 @@ use crate::diagnose::data::{Data, averaged};
 use crate::diagnose::evidence::{Evidence, Projected};
 use crate::export::{self, Model};
 use crate::mechanism::Mechanism;
+use crate::plant::Plant;
 use rand::{Rng, SeedableRng};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -28,7 +29,7 @@ fn robot(name: &str) -> Plant {
         }
         _ => Plant::load(name).unwrap(),
     };
-    plant.with_terms(&[]).unwrap()
+    plant.with_terms(&[])
 }
 
 /// Two periods of a motion that moves every coordinate.
