@@ -86,6 +86,7 @@ fn record(plant: &Plant, phi: &[f64], trouble: &Trouble, seed: u64) -> excite::R
         pose: None,
         pressures: None,
         resampled: false,
+        written: None,
         warnings: Vec::new(),
     })
 }

@@ -20,8 +20,8 @@
 use super::catalogue::{Context, Effect};
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
-use crate::plant::Kind;
-use crate::robot::{JointTerm, Prior};
+use super::prior::{Closeness, factors};
+use crate::robot::Prior;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use rayon::prelude::*;
@@ -34,22 +34,6 @@ const LIKELY: f64 = 3.84;
 /// By how much the two factors may differ: robots of few joints hardly tell first moments from tensors, and one
 /// must not be taken for exact because the other can stand for it.
 const APART: f64 = 3.0;
-
-/// Factors on the deviations of the prior: of masses, first moments and rotors, and of tensors.
-pub type Closeness = [f64; 2];
-
-/// Factor of every parameter of the nominal model.
-pub fn factors(data: &Data, closeness: Closeness) -> Vec<f64> {
-    let of = |kind: &Kind| match kind {
-        Kind::Inertial { k, .. } => closeness[usize::from(*k > 3)],
-        Kind::Term {
-            term: JointTerm::Armature,
-            ..
-        } => closeness[0],
-        Kind::Term { .. } | Kind::Nuisance => 1.0,
-    };
-    data.parameters.iter().map(|p| of(&p.kind)).collect()
-}
 
 /// Residual, model and one set of columns as the parameters see them, in units of the prior.
 struct Reduced {
@@ -115,7 +99,7 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
         .collect();
     let costs: Vec<f64> = pairs
         .par_iter()
-        .map(|c| cost(&reduced, &factors(data, *c), samples.ln()))
+        .map(|c| cost(&reduced, &factors(&data.parameters, *c), samples.ln()))
         .collect();
     // the loosest that are nearly as likely: robots of few joints say little about it
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);

@@ -14,12 +14,12 @@
 //! all joints (Siciliano, Sciavicco, Villani & Oriolo 2009, ch. 8). Whichever leaves less is taken,
 //! if it explains the torque and its gains are positive and certain.
 
-use super::closed;
-use super::data::{Data, sign};
+use super::data::Data;
 use super::evidence::{Fit, solve};
-use super::record;
+use super::window::sign;
 use crate::dynamics::Samples;
 use crate::plant::Plant;
+use crate::signals::wiener::limited;
 use crate::simulate::Dynamics;
 use crate::simulate::control::actuation;
 use faer::Mat;
@@ -163,7 +163,7 @@ impl Signals {
             let Some(actuators) = &r.reference else {
                 continue;
             };
-            along.push(closed::coordinates(data.plant, actuators, r.cycle)?);
+            along.push(data.plant.coordinate_motion(actuators, r.cycle)?);
         }
         // error of the coordinates and of the actuators, with derivative and integral
         let errors = |commanded: &Samples, x: &Samples, dt: f64| -> Vec<[Vec<f64>; 3]> {
@@ -216,11 +216,13 @@ impl Signals {
             .zip(&coordinates)
             .map(|(x, errors)| pushed(data.plant, x, errors))
             .collect::<crate::Result<Vec<_>>>()?;
-        // rows of one actuator in the fitted records, each limited to the band of the positions
-        let limited = |column: &dyn Fn(usize, usize) -> Vec<f64>| -> Vec<f64> {
+        // rows of one actuator in the fitted records, each limited to the band of the positions; what
+        // was not measured counts for nothing
+        let in_band = |column: &dyn Fn(usize, usize) -> Vec<f64>| -> Vec<f64> {
             let each = fitted.iter().enumerate().flat_map(|(i, k)| {
                 let r = &data.records[*k];
-                record::limited(&column(i, *k), r.cycle, r.dt)
+                let rows = limited(&column(i, *k), r.cycle, r.dt);
+                r.silenced(&rows).into_owned()
             });
             each.collect()
         };
@@ -241,7 +243,7 @@ impl Signals {
         let command = |k: usize| data.records[k].reference.as_ref().unwrap_or(&empty);
         Ok(Signals {
             tau: (0..n)
-                .map(|j| limited(&|_, k| span(&data.tau[j], k)))
+                .map(|j| in_band(&|_, k| span(&data.tau[j], k)))
                 .collect(),
             ahead: (0..n)
                 .map(|j| {
@@ -253,20 +255,20 @@ impl Signals {
                             .collect()
                     };
                     vec![
-                        limited(&|_, k| vec![1.0; data.records[k].count]),
-                        limited(&|_, k| part(&command(k).qd, j, k)),
-                        limited(&|_, k| part(&command(k).qdd, j, k)),
-                        limited(&|_, k| sense(k)),
-                        limited(&|_, k| span(&full[j], k)),
-                        limited(&|_, k| span(&gravity[j], k)),
+                        in_band(&|_, k| vec![1.0; data.records[k].count]),
+                        in_band(&|_, k| part(&command(k).qd, j, k)),
+                        in_band(&|_, k| part(&command(k).qdd, j, k)),
+                        in_band(&|_, k| sense(k)),
+                        in_band(&|_, k| span(&full[j], k)),
+                        in_band(&|_, k| span(&gravity[j], k)),
                     ]
                 })
                 .collect(),
             error: (0..n)
-                .map(|j| [0, 1, 2].map(|part| limited(&|i, _| actuators[i][j][part].clone())))
+                .map(|j| [0, 1, 2].map(|part| in_band(&|i, _| actuators[i][j][part].clone())))
                 .collect(),
             weighted: (0..n)
-                .map(|j| [0, 1, 2].map(|part| limited(&|i, _| pushed[i][part][j].clone())))
+                .map(|j| [0, 1, 2].map(|part| in_band(&|i, _| pushed[i][part][j].clone())))
                 .collect(),
             noise: (0..n).map(|j| data.noise[j].std).collect(),
         })

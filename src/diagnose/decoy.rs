@@ -13,7 +13,8 @@
 //! itself, up to its sign. This is the circular-shift null of time series (Theiler et al. 1992 call such
 //! series surrogates).
 
-use super::data::{Column, Data};
+use super::column::Column;
+use super::data::Data;
 use super::evidence::{Evidence, Projected};
 
 /// Number of decoys of an effect.

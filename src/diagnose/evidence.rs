@@ -14,7 +14,8 @@
 //! of a frozen model. Both questions are one formula. The **visibility** of an effect is
 //! `ηᵀSη / ηᵀZᵀZη`.
 
-use super::data::{Column, Data};
+use super::column::Column;
+use super::data::Data;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use rayon::prelude::*;
@@ -447,13 +448,22 @@ impl<'a> Evidence<'a> {
         (solve(&b.s, &rhs).gain / own.max(1e-300)).clamp(0.0, 1.0)
     }
 
-    /// A whitened residual as it was before, in units of the noise of each actuator.
+    /// A whitened residual as it was before, in units of the noise of each actuator; zero where
+    /// nothing was measured.
     pub fn unwhitened(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        residual
-            .par_iter()
-            .enumerate()
-            .map(|(j, e)| self.data.unwhiten(j, e))
-            .collect()
+        let before = residual.par_iter().enumerate();
+        let before = before.map(|(j, e)| self.data.unwhiten(j, e)).collect();
+        self.data.silenced(before)
+    }
+
+    /// What the nominal model leaves of the torque beside a fitted set, by actuator, N m or N; zero
+    /// where nothing was measured.
+    pub fn torque_left(&self, set: &[&Projected]) -> Vec<Vec<f64>> {
+        let mut all = self.unwhitened(&self.residual(set, &self.fit(set)));
+        for (row, noise) in all.iter_mut().zip(&self.data.noise) {
+            row.iter_mut().for_each(|v| *v *= noise.std);
+        }
+        all
     }
 
     /// Energies of a whitened residual.

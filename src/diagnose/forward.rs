@@ -25,11 +25,12 @@
 use super::catalogue::{Context, Effect};
 use super::controller::{Feedback, Kind as Acts};
 use super::data::Data;
-use super::record::Record;
+use super::payload::Load;
 use super::verdict::Member;
 use crate::error::{Error, Result};
 use crate::report::format::unit_of;
 use crate::robot::Robot;
+use crate::signals::series::Series;
 use crate::simulate::Dynamics;
 use crate::simulate::control::actuation;
 use crate::simulate::friction::hold;
@@ -118,7 +119,8 @@ pub fn forward(
         .par_iter()
         .map(|(k, m)| {
             let effects = (*m == 2).then_some(effects);
-            run(data, *k, &robots[*m], effects, held.as_ref().ok())
+            let load = data.load(*k, phi[*m]);
+            run(data, *k, (&robots[*m], load), effects, held.as_ref().ok())
         })
         .collect::<Vec<_>>()
         .into_iter();
@@ -157,7 +159,7 @@ pub fn forward(
 }
 
 /// Samples of a record that are simulated.
-fn length(r: &Record) -> usize {
+fn length(r: &Series) -> usize {
     r.count.min((LONGEST / r.dt) as usize + 1)
 }
 
@@ -198,17 +200,22 @@ impl Answer {
     }
 }
 
-/// Deviation from record `k` by actuator, and the torque by which the controller answers it.
+/// Deviation from record `k`, run by a robot with its load, by actuator, and the torque by which the controller
+/// answers it.
 fn run(
     data: &Data,
     k: usize,
-    robot: &Robot,
+    (robot, load): (&Robot, Option<Load>),
     effects: Option<&[Vec<f64>]>,
     held: Option<&Feedback>,
 ) -> Result<[Vec<Vec<f64>>; 2]> {
     let (plant, r) = (data.plant, &data.records[k]);
     let (m, n, na) = (plant.coordinates(), robot.dof(), data.joints());
-    let bodies = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
+    let mut bodies: Vec<f64> = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
+    if let (Some(load), Some(tool)) = (load, plant.tool()) {
+        let body = bodies[10 * tool..].iter_mut().zip(load);
+        body.for_each(|(b, l)| *b += l);
+    }
     let armature = robot.joints.iter().map(|j| j.terms[0]).collect();
     let mut dynamics = Dynamics::new(plant, bodies, armature, robot.gravity);
     let viscous = DVector::from_fn(n, |j, _| robot.joints[j].terms[1]);

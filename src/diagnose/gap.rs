@@ -7,8 +7,9 @@
 //! 2012, ch. 4).
 
 use super::data::Data;
-use super::noise::{LINES, between_periods, period_mean, spectrum};
-use super::record::Record;
+use super::noise::{LINES, between_periods, spectrum};
+use crate::signals::series::Series;
+use crate::signals::wiener::triangle;
 
 /// Gap of one actuator in physical units.
 #[derive(Debug, Clone, Default)]
@@ -37,22 +38,31 @@ pub struct Shares {
 }
 
 /// Energy of a whitened residual above the noise in one record of one actuator: what repeats, and
-/// what does not.
-pub fn excess(record: &Record, e: &[f64]) -> (f64, f64) {
-    let n = e.len() as f64;
+/// what does not. The residual is zero where nothing was measured.
+pub fn excess(record: &Series, e: &[f64]) -> (f64, f64) {
+    let n = record.sound() as f64;
     let Some(cycle) = record.cycle else {
         let total: f64 = e.iter().map(|v| v * v).sum();
         return ((total - n).max(-0.1 * n), 0.0);
     };
     let periods = record.periods() as f64;
-    let mean = period_mean(e, cycle);
+    let mean = record.period_mean(e);
     let between: f64 = e
         .iter()
         .enumerate()
+        .filter(|(i, _)| record.measured[*i])
         .map(|(i, v)| (v - mean[i % cycle]).powi(2))
         .sum();
-    let variance = between / (cycle as f64 * (periods - 1.0));
-    let repeating = periods * mean.iter().map(|v| v * v).sum::<f64>() - variance * cycle as f64;
+    let free = record.freedoms();
+    let variance = between / free.max(1) as f64;
+    // a phase of the period counts by how often it was measured
+    let mut often = vec![0usize; cycle];
+    for i in (0..e.len()).filter(|i| record.measured[*i]) {
+        often[i % cycle] += 1;
+    }
+    let part = |(v, n): (&f64, &usize)| v * v * (*n as f64 / periods);
+    let power: f64 = mean.iter().zip(&often).map(part).sum();
+    let repeating = periods * power - variance * (record.sound() - free) as f64;
     // slow changes stand out at the lowest lines; what is broad must exceed the noise clearly
     let slow = match between_periods(record, e) {
         Some(x) => {
@@ -76,7 +86,7 @@ pub fn excess(record: &Record, e: &[f64]) -> (f64, f64) {
 pub fn energies(
     data: &Data,
     residual: &[Vec<f64>],
-    pick: impl Fn(&Record) -> bool,
+    pick: impl Fn(&Series) -> bool,
 ) -> Vec<[f64; 2]> {
     (0..data.joints())
         .map(|j| {
@@ -84,7 +94,7 @@ pub fn energies(
             for (k, r) in data.records.iter().enumerate() {
                 if pick(r) {
                     let (a, b) = excess(r, &residual[j][data.span(k)]);
-                    sum[0] += a - data.noise[j].excess * r.count as f64;
+                    sum[0] += a - data.noise[j].excess * r.sound() as f64;
                     sum[1] += b;
                 }
             }
@@ -97,7 +107,7 @@ pub fn energies(
 pub fn joints(
     data: &Data,
     residual: &[Vec<f64>],
-    pick: impl Fn(&Record) -> bool + Copy,
+    pick: impl Fn(&Series) -> bool + Copy,
 ) -> Vec<JointGap> {
     let names = data.plant.actuators();
     let mut out: Vec<JointGap> = (0..data.joints())
@@ -106,14 +116,12 @@ pub fn joints(
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| pick(r)) {
                 let e = &residual[j][data.span(k)];
                 sum += e.iter().map(|v| v * v).sum::<f64>();
-                count += r.count as f64;
+                count += r.sound() as f64;
                 // relative errors below about 20 Hz, torque and residual filtered alike
                 let w = ((0.024 / r.dt).round() as usize).max(1);
-                let low = |x: &[f64]| -> f64 {
-                    super::record::triangle(x, w).iter().map(|v| v * v).sum()
-                };
+                let low = |x: &[f64]| -> f64 { triangle(x, w).iter().map(|v| v * v).sum() };
                 filtered += low(e);
-                torque += low(r.torque(j));
+                torque += low(&r.silenced(r.torque(j)));
             }
             let noise = data.noise[j].std;
             JointGap {
@@ -150,7 +158,7 @@ pub fn shares(data: &Data, residual: &[Vec<f64>]) -> Shares {
             repeating += a.max(0.0);
             other += b;
             if symmetric {
-                let mean = period_mean(e, cycle);
+                let mean = r.period_mean(e);
                 let half = cycle / 2;
                 // noise of the mean period, half of it in either part
                 let periods = r.periods() as f64;
@@ -181,7 +189,7 @@ pub fn shares(data: &Data, residual: &[Vec<f64>]) -> Shares {
 }
 
 /// Whether all coordinates move on odd harmonics of the period only.
-pub fn is_odd(r: &Record) -> bool {
+pub fn is_odd(r: &Series) -> bool {
     let Some(cycle) = r.cycle else {
         return false;
     };
@@ -217,14 +225,15 @@ pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
         };
         // one record trains, the others of the fit are predicted, and the other way round
         let mut sums = vec![[(0.0, 0.0); 2]; 2 * BINS * BINS];
-        let part = |k: usize, i: usize, r: &Record| -> usize {
+        let part = |k: usize, i: usize, r: &Series| -> usize {
             let chunk = r.cycle.unwrap_or(r.count.div_ceil(8));
             (i / chunk + k) % 2
         };
         for pass in 0..2 {
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| r.fit) {
                 let (q, v) = r.state(j);
-                for (i, x) in e[data.span(k)].iter().enumerate() {
+                let rows = e[data.span(k)].iter().enumerate();
+                for (i, x) in rows.filter(|(i, _)| r.measured[*i]) {
                     let side = part(k, i, r);
                     let b = bin(q[i], v[i]);
                     if pass == 0 {

@@ -11,9 +11,9 @@
 //! with the entropic distance `D` of [`consistent`](crate::identify::consistent), the barrier that keeps
 //! every body inside.
 
-use super::Finding;
 use super::catalogue::{Context, Effect, Estimate};
 use super::evidence::Evidence;
+use super::finding::Finding;
 use crate::error::{Warning, WarningKind};
 use crate::export::{self, FORMATS, Format, Remark};
 use crate::identify::consistent::{self, Prior};

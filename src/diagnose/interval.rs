@@ -42,7 +42,9 @@ pub fn explained(
             };
             let noise: f64 = data.noise.iter().map(|n| 1.0 + n.excess).sum();
             let gone = energy(without) - energy(with);
-            blocks.push([gone, energy(total) - noise * part.len() as f64]);
+            let at = part.start - span.start..part.end - span.start;
+            let sound = r.measured[at].iter().filter(|m| **m).count();
+            blocks.push([gone, energy(total) - noise * sound as f64]);
         }
     }
     let ratio = |sum: [f64; 2]| sum[0] / sum[1].max(1e-9);

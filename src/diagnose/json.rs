@@ -1,8 +1,9 @@
 //! `diagnosis.json`.
 
 use super::controller::BANDWIDTH;
+use super::finding::Finding;
 use super::forward::MODELS;
-use super::{Diagnosis, Finding};
+use super::result::Diagnosis;
 use serde_json::{Map, Value, json};
 
 /// A number with five significant digits, `null` where it is not finite.

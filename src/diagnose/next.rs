@@ -20,8 +20,9 @@ mod trial;
 
 use super::catalogue::{Context, Effect};
 use super::evidence::Evidence;
+use super::finding::Finding;
 use super::search::Candidate;
-use super::{Finding, Settings};
+use super::settings::Settings;
 use crate::trajectory::Trajectory;
 use motions::Motions;
 use rand::SeedableRng;

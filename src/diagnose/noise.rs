@@ -7,7 +7,7 @@
 //! shows. A linear predictor of that spectrum (Levinson-Durbin) whitens every signal and every column
 //! alike, so that all tests count independent samples (Pintelon & Schoukens 2012, ch. 9).
 
-use super::record::Record;
+use crate::signals::series::Series;
 use std::f64::consts::PI;
 
 /// Frequency below which differences between periods are not noise, Hz.
@@ -52,27 +52,21 @@ pub fn spectrum(x: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Residual with the mean over periods taken away, scaled to the variance of one sample; `None`
-/// where the record does not repeat.
-pub fn between_periods(record: &Record, x: &[f64]) -> Option<Vec<f64>> {
+/// Residual with the mean over periods taken away, scaled to the variance of one sample, zero where
+/// nothing was measured; `None` where the record does not repeat.
+pub fn between_periods(record: &Series, x: &[f64]) -> Option<Vec<f64>> {
     let cycle = record.cycle?;
     let periods = record.periods();
-    let scale = (periods as f64 / (periods - 1) as f64).sqrt();
-    let mean = period_mean(x, cycle);
-    Some(
-        x.iter()
-            .enumerate()
-            .map(|(i, v)| scale * (v - mean[i % cycle]))
-            .collect(),
-    )
-}
-
-/// Mean period of a signal.
-pub fn period_mean(x: &[f64], cycle: usize) -> Vec<f64> {
-    let periods = x.len() / cycle;
-    (0..cycle)
-        .map(|i| (0..periods).map(|p| x[p * cycle + i]).sum::<f64>() / periods as f64)
-        .collect()
+    let scale = match record.sound() == record.count {
+        true => (periods as f64 / (periods - 1) as f64).sqrt(),
+        false => (record.sound() as f64 / record.freedoms().max(1) as f64).sqrt(),
+    };
+    let mean = record.period_mean(x);
+    let apart = |(i, v): (usize, &f64)| match record.measured[i] {
+        true => scale * (v - mean[i % cycle]),
+        false => 0.0,
+    };
+    Some(x.iter().enumerate().map(apart).collect())
 }
 
 /// Where the noise came from.
@@ -125,18 +119,19 @@ fn flat_below(s: &mut [f64], dt: f64) {
 }
 
 impl Noise {
-    /// From signals that hold nothing but noise: differences between periods.
-    pub fn from_periods(parts: &[(Vec<f64>, f64)]) -> Self {
+    /// From signals that hold nothing but noise, each with its number of measured samples:
+    /// differences between periods, sampled every `dt` seconds.
+    pub fn from_periods(parts: &[(Vec<f64>, usize)], dt: f64) -> Self {
         let mut s = vec![0.0; LINES + 1];
         let mut weight = 0.0;
-        for (x, _) in parts {
+        for (x, sound) in parts {
             for (s, v) in s.iter_mut().zip(spectrum(x)) {
                 *s += v * x.len() as f64;
             }
-            weight += x.len() as f64;
+            weight += *sound as f64;
         }
         s.iter_mut().for_each(|v| *v /= weight);
-        flat_below(&mut s, parts[0].1);
+        flat_below(&mut s, dt);
         Self::new(s, Source::Periods)
     }
 

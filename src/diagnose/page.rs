@@ -1,8 +1,10 @@
 //! The report: where the gap lies, what causes it, how far it shrinks, what to run next.
 
 use super::controller::Kind;
+use super::finding::Finding;
 use super::next::Proposal;
-use super::{Diagnosis, Finding, Verdict};
+use super::result::Diagnosis;
+use super::verdict::Verdict;
 use crate::report::format::{percent, significant};
 use crate::report::html::{Section, Tone, details, figure, legend, page, table, tiles};
 use crate::report::joints;
@@ -262,7 +264,7 @@ fn residuals(d: &Diagnosis) -> Markup {
     .svg();
     let rows: Vec<Vec<Markup>> = (0..d.joints.len())
         .map(|j| {
-            let cell = |g: &super::JointGap| {
+            let cell = |g: &super::gap::JointGap| {
                 html! { (significant(g.rms, 3)) " " (d.units[j])
                 div { small { (percent(g.relative)) " of the torque, " (significant(g.rms / g.noise, 2)) " × noise" } } }
             };

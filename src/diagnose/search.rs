@@ -1,7 +1,7 @@
 //! Search over effects, places and shapes.
 
 use super::catalogue::{Context, Effect, Place, Shape};
-use super::data::Column;
+use super::column::Column;
 use super::evidence::{Evidence, Fit, Projected};
 use rayon::prelude::*;
 

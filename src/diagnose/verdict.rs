@@ -10,7 +10,8 @@
 //!    its joints, of how that holds on holdout records, and of its share against its rivals.
 
 use super::catalogue::{Context, Effect, Place, Shape};
-use super::data::{Column, Data};
+use super::column::Column;
+use super::data::Data;
 use super::decoy;
 use super::evidence::{Evidence, Fit, Projected};
 use super::gap;
@@ -96,6 +97,14 @@ pub struct Decision {
     pub surprise: [f64; 2],
     /// share of the gap that stays
     pub unexplained: f64,
+}
+
+impl Decision {
+    /// Columns of the members.
+    pub fn projected(&self) -> Vec<&Projected> {
+        let members = self.members.iter();
+        members.map(|m| &m.candidate.projected).collect()
+    }
 }
 
 /// Gain that an effect must bring, per row of a joint, in noise variances.

@@ -22,9 +22,11 @@ pub mod number;
 mod record;
 pub mod resample;
 pub mod table;
+mod written;
 
 pub use experiment::Experiment;
 pub use table::Table;
+pub use written::{Channels, Written};
 
 use crate::error::Warning;
 use std::path::PathBuf;
@@ -96,6 +98,8 @@ pub struct Record {
     pub pressures: Option<[Vec<Vec<f64>>; 2]>,
     /// whether the samples were interpolated to an even grid
     pub resampled: bool,
+    /// the samples before that; see [`Record::as_written`]
+    pub written: Option<Written>,
     /// what was found, and repaired
     pub warnings: Vec<Warning>,
 }

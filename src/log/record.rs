@@ -69,7 +69,7 @@ fn take(table: &mut Table, group: &str, n: usize, path: &Path) -> Result<Option<
 }
 
 /// Whether the names of the columns can be those of a log of `n` actuators.
-fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warning>> {
+pub(super) fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warning>> {
     let n = joints.len();
     let error = |message: String| Err(Error::file(path, "line 1", message));
     let mut unknown = Vec::new();
@@ -144,11 +144,23 @@ impl Record {
         let path = path.as_ref();
         let known = |name: &str| name == "t" || POSE.contains(&name) || numbered(name).is_some();
         let joints = plant.actuators();
-        let n = joints.len();
         let check = |table: &Table| check_names(table, &joints, path);
         let (mut table, unknown) = Table::read_checked(path, &known, &check)?;
+        table.warnings.extend(unknown);
+        Self::of_table(table, path, plant, purpose, period)
+    }
+
+    /// A record from the columns of a log.
+    pub(super) fn of_table(
+        mut table: Table,
+        path: &Path,
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+    ) -> Result<Record> {
+        let joints = plant.actuators();
+        let n = joints.len();
         let mut warnings = std::mem::take(&mut table.warnings);
-        warnings.extend(unknown);
         let subject = path.display().to_string();
 
         let at = table.find("t").unwrap_or(0);
@@ -190,6 +202,7 @@ impl Record {
             pose: None,
             pressures: None,
             resampled: false,
+            written: None,
             warnings,
         };
         if let (Some(a), Some(b)) = (
@@ -210,6 +223,7 @@ impl Record {
         record.check_channels(&joints)?;
         let duration = clock.t[clock.t.len() - 1] - clock.t[0];
         record.drop_wrong_period(clock.step, duration);
+        record.written = record.before_grid(&clock);
         record.resample(&clock)?;
         record.check_period();
         Ok(record)

@@ -1,6 +1,7 @@
 //! Coordinates from what a log holds: positions and rates of the actuators, or a measured pose.
 
 use super::Plant;
+use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::mechanism::follow;
 
@@ -51,6 +52,36 @@ impl Plant {
             }),
             Some(mechanism) => follow::rates(mechanism, x, dq, ddq),
         }
+    }
+
+    /// Motion of the coordinates that goes with a motion of the actuators. Of a motion that repeats
+    /// after `cycle` samples one period is followed.
+    ///
+    /// # Errors
+    /// As [`Plant::coordinates_of`] and [`Plant::rates_of`].
+    pub fn coordinate_motion(&self, moved: &Samples, cycle: Option<usize>) -> Result<Samples> {
+        if self.mechanism().is_none() {
+            return Ok(moved.clone());
+        }
+        let count = cycle.unwrap_or(moved.count);
+        let once = |x: &[f64]| -> Vec<Vec<f64>> {
+            let rows = x.chunks_exact(moved.count);
+            rows.map(|row| row[..count].to_vec()).collect()
+        };
+        let x = self.coordinates_of(&once(&moved.q))?;
+        let rates = self.rates_of(&x, &once(&moved.qd), Some(&once(&moved.qdd)))?;
+        let again = |rows: &[Vec<f64>]| -> Vec<f64> {
+            let all = rows.iter();
+            all.flat_map(|r| r.iter().copied().cycle().take(moved.count))
+                .collect()
+        };
+        Ok(Samples {
+            dof: x.len(),
+            count: moved.count,
+            q: again(&x),
+            qd: again(&rates.velocity),
+            qdd: again(&rates.acceleration.unwrap_or_default()),
+        })
     }
 }
 

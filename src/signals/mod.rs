@@ -28,7 +28,11 @@ pub mod butterworth;
 pub mod cutoff;
 pub mod decimate;
 pub mod fourier;
+mod grid;
 mod prepare;
+pub mod repeats;
+pub mod series;
+pub mod wiener;
 
 pub use butterworth::Butterworth;
 pub use decimate::Decimator;
@@ -39,6 +43,19 @@ use crate::error::Warning;
 use crate::log::Purpose;
 use faer::Mat;
 
+/// How positions are differentiated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Derivation {
+    /// a low-pass whose cut-off is chosen from the data: whole harmonics of a motion that repeats, a
+    /// Butterworth filter otherwise
+    #[default]
+    LowPass,
+    /// as the diagnosis does it ([`wiener`]): every harmonic of a motion that repeats weighted by how far it
+    /// stands out of the scatter between periods, a fixed low-pass otherwise
+    Wiener,
+}
+
 /// How signals are prepared. `None` is chosen from the data.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -47,6 +64,8 @@ pub struct Settings {
     pub position_cutoff: Option<f64>,
     /// cut-off of the filter that torque and regressor pass, Hz; infinity for none
     pub cutoff: Option<f64>,
+    /// how positions are differentiated
+    pub derivation: Derivation,
     /// order of one pass of the Butterworth filter
     pub order: usize,
     /// whether a motion that repeats is averaged over its periods
@@ -62,6 +81,7 @@ impl Default for Settings {
         Settings {
             position_cutoff: None,
             cutoff: None,
+            derivation: Derivation::LowPass,
             order: 4,
             average: true,
             measured_rates: true,

@@ -1,7 +1,7 @@
 //! From a record to a [`Prepared`] one.
 
 use super::butterworth::{Butterworth, first_derivative, second_derivative};
-use super::{Decimator, Periods, Prepared, Settings, cutoff, fourier};
+use super::{Decimator, Derivation, Periods, Prepared, Settings, cutoff, fourier, wiener};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Record;
@@ -84,6 +84,11 @@ impl Prepared {
                     let as_is = [q.clone(), dq[j].clone(), ddq[j].clone()];
                     return Ok((f64::INFINITY, as_is));
                 }
+                if settings.derivation == Derivation::Wiener && dq.is_none() {
+                    let (s, _, band) =
+                        wiener::differentiated(q, &[0.0], q.len(), None, record.step);
+                    return Ok((band, [s.q, s.qd, s.qdd]));
+                }
                 let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
                 let frequency = match settings.position_cutoff {
                     Some(f) => f,
@@ -116,6 +121,7 @@ impl Prepared {
             (Some(_), Some(_), _) => "measured velocities and accelerations, taken as they are",
             (_, _, Some(_)) => "as asked for",
             (Some(_), None, _) => "least estimated error of the acceleration (measured velocities)",
+            _ if settings.derivation == Derivation::Wiener => "the low-pass of the diagnosis",
             _ => "least estimated error of the acceleration, at most 2.5 cut-offs of the torque",
         };
         let mut valid = record.valid.clone();
@@ -208,6 +214,14 @@ impl Prepared {
         let series: Vec<(f64, Rates)> = x
             .par_iter()
             .map(|q| {
+                if settings.derivation == Derivation::Wiener {
+                    let all = &q[from..from + samples * count];
+                    let cycles = Some((samples, samples * (count - 1)));
+                    let (s, _, band) =
+                        wiener::differentiated(all, &[0.0], all.len(), cycles, record.step);
+                    let one = [s.q, s.qd, s.qdd].map(|x| x[..samples].to_vec());
+                    return (if band > 0.0 { band } else { wiener::BAND }, one);
+                }
                 let parts: Vec<&[f64]> = (0..count)
                     .map(|p| &q[from + p * samples..from + (p + 1) * samples])
                     .collect();
@@ -247,6 +261,9 @@ impl Prepared {
             .collect();
         let reason = match settings.position_cutoff {
             Some(_) => "as asked for",
+            None if settings.derivation == Derivation::Wiener => {
+                "harmonics weighted by how far they stand out of the scatter of the periods"
+            }
             None => {
                 "least estimated error of the acceleration, noise from the scatter of the periods"
             }
@@ -300,6 +317,13 @@ fn check(settings: &Settings, record: &Record) -> Result<()> {
             record.path.display(),
             record.rate()
         )));
+    }
+    if settings.derivation == Derivation::Wiener && settings.position_cutoff.is_some() {
+        return Err(Error::Argument(
+            "a cut-off of the positions belongs to the derivation \"low_pass\"; \"wiener\" weighs every \
+             harmonic by its own noise: leave one of the two out"
+                .into(),
+        ));
     }
     if let Some(f) = settings.cutoff
         && (f.is_nan() || f <= 0.0)

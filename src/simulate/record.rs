@@ -128,6 +128,7 @@ pub fn to_record(run: &Run, measured: &Measured, purpose: Purpose, period: f64) 
         pose: None,
         pressures: None,
         resampled: false,
+        written: None,
         warnings: Vec::new(),
     }
 }

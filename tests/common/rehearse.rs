@@ -1,7 +1,7 @@
 //! Rehearsals: a motion is designed, a robot follows it in simulation, and its sensors are read.
 
 use excite::design::{Condition, Settings as Design, design};
-use excite::diagnose::record::Raw;
+use excite::log::{Channels, Purpose, Record};
 use excite::plant::Plant;
 use excite::simulate::record::{Sensors, measure};
 use excite::simulate::{Effects, Settings as Simulation, simulate};
@@ -55,9 +55,16 @@ pub fn simulation(effects: Effects) -> Simulation {
     }
 }
 
+/// A record of these channels.
+pub fn record(plant: &Plant, period: f64, fit: bool, channels: Channels) -> Record {
+    let name = format!("{period:.2} s");
+    let purpose = if fit { Purpose::Fit } else { Purpose::Holdout };
+    Record::from_channels(&name, channels, plant, purpose, Some(period)).unwrap()
+}
+
 /// What a robot did.
 pub struct Log {
-    pub raw: Raw,
+    pub record: Record,
     /// positions of the actuators without their sensors, one actuator after the other
     pub truth: Vec<f64>,
 }
@@ -75,25 +82,24 @@ pub fn log(
     let sensors = Sensors::new(plant, noise).0;
     let seen = measure(&run, &sensors, &settings.effects, seed);
     let columns = |x: &[f64]| x.chunks(run.t.len()).map(<[f64]>::to_vec).collect();
-    let raw = Raw {
-        name: format!("{:.2} s", motion.period),
-        fit,
-        period: Some(motion.period),
+    let channels = Channels {
         q: columns(&seen.q),
         tau: columns(&seen.tau),
         qref: Some(columns(&run.reference)),
         t: run.t,
     };
     Log {
-        raw,
+        record: record(plant, motion.period, fit, channels),
         truth: run.actuators.q,
     }
 }
 
 /// A log without the commands: nothing is known of the controller.
-pub fn without_commands(log: Log) -> Raw {
-    Raw {
-        qref: None,
-        ..log.raw
+pub fn without_commands(log: Log) -> Record {
+    let mut record = log.record;
+    record.qref = None;
+    if let Some(written) = &mut record.written {
+        written.qref = None;
     }
+    record
 }

@@ -6,9 +6,8 @@ use crate::common::rehearse::{self, Log, without_commands};
 use crate::common::shared::shared;
 use excite::diagnose::controller::{Feedback, Kind, identify};
 use excite::diagnose::evidence::Evidence;
-use excite::diagnose::record::Raw;
-use excite::diagnose::{Diagnosis, Settings, Verdict, of_logs, prepare, raw};
-use excite::log::Experiment;
+use excite::diagnose::{Diagnosis, Settings, Verdict, of_logs, prepare};
+use excite::log::{Channels, Experiment, Record};
 use excite::plant::Plant;
 use excite::robot::{Inertia, Prior};
 use excite::simulate::record::{Sensors, measure};
@@ -51,7 +50,7 @@ fn log(plant: &Plant, motion: &Fourier, fit: bool, settings: &Simulation, noise:
     rehearse::log(plant, motion, fit, settings, noise, 7)
 }
 
-fn feedback(plant: &Plant, raws: &[Raw]) -> Result<Feedback, String> {
+fn feedback(plant: &Plant, raws: &[Record]) -> Result<Feedback, String> {
     let data = prepare(plant, raws).unwrap();
     let phi = Evidence::new(&data, 1.0).phi;
     identify(&data, &phi)
@@ -65,7 +64,7 @@ fn inverse_dynamics_control_is_found_and_gives_the_motion_of_the_model() {
     let slow = motion(6, 6.0, 0.4);
     let one = |motion: &Fourier, fit: bool| log(&plant, motion, fit, &real, NOISE);
     let (fitted, held) = (one(&fast, true), one(&slow, false));
-    let (raws, truth) = ([fitted.raw, held.raw], held.truth);
+    let (raws, truth) = ([fitted.record, held.record], held.truth);
     let found = feedback(&plant, &raws).unwrap();
     let omega = TAU * 3.0;
     assert_eq!(found.kind, Kind::InverseDynamics);
@@ -155,15 +154,13 @@ fn gains_of_single_joints_are_found() {
             out
         })
         .collect();
-    let raw = Raw {
-        name: "joints".into(),
-        fit: true,
-        period: Some(4.0),
+    let channels = Channels {
         t: run.t.clone(),
         q: columns(&seen.q),
         tau: columns(&seen.tau),
         qref: Some(commanded),
     };
+    let raw = rehearse::record(&plant, 4.0, true, channels);
     let found = feedback(&plant, std::slice::from_ref(&raw)).unwrap();
     assert_eq!(found.kind, Kind::Actuators);
     assert!(found.soft.len() < 2, "{:?}", found.soft);
@@ -181,7 +178,10 @@ fn gains_of_single_joints_are_found() {
         }
     }
     // without the commands there is no controller, and the diagnosis says so
-    let blind = Raw { qref: None, ..raw };
+    let blind = without_commands(Log {
+        record: raw,
+        truth: Vec::new(),
+    });
     assert!(feedback(&plant, &[blind]).unwrap_err().contains("qref1"));
 }
 
@@ -190,7 +190,7 @@ fn gains_of_single_joints_are_found() {
 fn torque_without_feedback_gives_no_gains() {
     let plant = Plant::load("planar2").unwrap();
     let sim = settings(Controller::Feedforward, 10.0, 0.1);
-    let mut raw = log(&plant, &motion(2, 3.0, 0.6), true, &sim, NOISE).raw;
+    let mut raw = log(&plant, &motion(2, 3.0, 0.6), true, &sim, NOISE).record;
     let shifted = raw.t.len() / 5;
     for q in raw.qref.iter_mut().flatten() {
         q.rotate_left(shifted);
@@ -207,8 +207,7 @@ fn the_controller_of_the_emps() {
         return;
     };
     let experiment = Experiment::read(folder.join("experiment.toml")).unwrap();
-    let raws = raw(&experiment).unwrap();
-    let found = feedback(&experiment.plant, &raws).unwrap();
+    let found = feedback(&experiment.plant, &experiment.records).unwrap();
     let [kp, kd, _] = found.gains[0];
     println!(
         "EMPS: k_p/k_d {:.1} 1/s (published 160.18), leaves {:?}",
@@ -229,7 +228,7 @@ fn identified(perturb: f64, load: Option<f64>) -> Diagnosis {
         let com = nalgebra::Vector3::new(0.02, 0.0, 0.06);
         Inertia::from_com(m, com, nalgebra::Matrix3::identity() * (1e-4 * m))
     });
-    let raws: Vec<Raw> = [(4.0, 0.6, true), (6.5, 0.5, true), (5.0, 0.55, false)]
+    let raws: Vec<Record> = [(4.0, 0.6, true), (6.5, 0.5, true), (5.0, 0.55, false)]
         .map(|(period, size, fit)| {
             without_commands(log(&plant, &motion(6, period, size), fit, &sim, 1.0))
         })

@@ -6,13 +6,12 @@
 use crate::common::noise::normal;
 use crate::common::rng;
 use crate::common::shared::shared;
-use excite::diagnose::record::Raw;
-use excite::diagnose::{Diagnosis, Settings, Verdict, diagnose, json, of_logs, page};
+use excite::diagnose::{Diagnosis, Settings, Verdict, diagnose, json, of_logs, page, prepare};
 use excite::dynamics::{Samples, Tree};
-use excite::log::Experiment;
+use excite::log::{Channels, Experiment, Payload, Purpose, Record};
 use excite::plant::Plant;
 use excite::regressor::nominal_torque;
-use excite::robot::JointTerm;
+use excite::robot::{Inertia, JointTerm};
 use excite::trajectory::{Fourier, Series};
 use rand::Rng;
 
@@ -69,7 +68,7 @@ fn log(
     fit: bool,
     seed: u64,
     extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64,
-) -> Raw {
+) -> Record {
     let periods = 3;
     let per = (f.period * RATE).round() as usize;
     let count = per * periods;
@@ -87,10 +86,7 @@ fn log(
         states.push((q, v));
     }
     let tau = nominal_torque(machine, &Tree::new(machine), &x);
-    let mut raw = Raw {
-        name: format!("log {seed}"),
-        fit,
-        period: Some(f.period),
+    let mut raw = Channels {
         t: (0..count).map(|i| i as f64 / RATE).collect(),
         q: vec![Vec::new(); 2],
         tau: vec![Vec::new(); 2],
@@ -104,35 +100,52 @@ fn log(
             raw.q[j].push(((q[j] + 3e-6 * normal(&mut rng)) / 1e-5).round() * 1e-5);
         }
     }
-    raw
+    let purpose = if fit { Purpose::Fit } else { Purpose::Holdout };
+    let (name, plant) = (format!("log {seed}"), Plant::from(machine.clone()));
+    Record::from_channels(&name, raw, &plant, purpose, Some(f.period)).expect("a log")
 }
 
-fn run(extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64) -> Diagnosis {
-    let (plant, machine) = robots();
+fn logs(extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64) -> Vec<Record> {
+    let machine = robots().1;
+    logs_of([&machine; 4], extra)
+}
+
+/// Logs of four motions, each of a machine of its own; the last is not fitted to.
+fn logs_of(
+    machines: [&excite::Robot; 4],
+    extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64,
+) -> Vec<Record> {
     let records = [
         (4.0, true, true),
         (9.0, true, true),
         (5.0, false, true),
         (4.5, false, false),
     ];
-    let raws: Vec<Raw> = records
+    records
         .iter()
         .enumerate()
         .map(|(k, (period, odd, fit))| {
             log(
-                &machine,
+                machines[k],
                 &motion(*period, *odd, k as u64 / 2),
                 *fit,
                 40 + k as u64,
                 extra,
             )
         })
-        .collect();
+        .collect()
+}
+
+fn diagnosed(logs: &[Record]) -> Diagnosis {
     let settings = Settings {
         next: false,
         ..Settings::default()
     };
-    of_logs(&plant, &raws, &settings, &|_| {}).expect("a diagnosis")
+    of_logs(&robots().0, logs, &settings, &|_| {}).expect("a diagnosis")
+}
+
+fn run(extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64) -> Diagnosis {
+    diagnosed(&logs(extra))
 }
 
 fn claims(d: &Diagnosis) -> Vec<(&str, Vec<usize>)> {
@@ -259,6 +272,228 @@ fn a_load_that_sloshes_has_no_name() {
     // what was tried gains as much where it makes no sense
     let decoys: Vec<f64> = d.findings.iter().filter_map(|f| f.decoys).collect();
     assert!(decoys.iter().all(|v| *v > 0.5), "{decoys:?}");
+}
+
+/// What a log says of samples that were not measured holds for the diagnosis, too: a torque channel
+/// that stood still, dropped positions and a gap in the time leave no trace in the gap.
+#[test]
+fn what_was_not_measured_has_no_weight() {
+    let machine = robots().1;
+    let sound = logs(&mut |_, _, _, _, _| 0.0);
+    let damaged: Vec<Record> = sound
+        .iter()
+        .enumerate()
+        .map(|(k, r)| {
+            let mut c = Channels {
+                t: r.t.clone(),
+                q: r.q.clone(),
+                tau: r.tau.clone(),
+                qref: None,
+            };
+            // held for a quarter of a second, four times, each time in another part of the period
+            for at in [150usize, 520, 1111, 1600] {
+                let (value, until) = (c.tau[0][at], (at + 50).min(c.t.len()));
+                c.tau[0][at.min(until)..until].fill(value);
+            }
+            c.q[1][300..330].fill(f64::NAN);
+            c.q[1][900..940].fill(f64::NAN);
+            if k == 1 {
+                // rows that were never written
+                for x in [&mut c.t].into_iter().chain(&mut c.q).chain(&mut c.tau) {
+                    x.drain(700..760);
+                }
+            }
+            let plant = Plant::from(machine.clone());
+            let read = Record::from_channels(&r.name, c, &plant, r.purpose, r.period);
+            read.expect("a log with holes")
+        })
+        .collect();
+    assert!(damaged.iter().all(|r| r.valid.contains(&false)));
+    let (a, b) = (diagnosed(&sound), diagnosed(&damaged));
+    assert_eq!(a.verdict, Verdict::NoGap, "{:?}", claims(&a));
+    assert_eq!(b.verdict, Verdict::NoGap, "{:?}", claims(&b));
+    for (a, b) in a.frozen.iter().zip(&b.frozen) {
+        println!(
+            "{}: {:.4} {:.4}, noise {:.4} {:.4}",
+            a.joint, a.rms, b.rms, a.noise, b.noise
+        );
+        assert!((b.rms / a.rms - 1.0).abs() < 0.1, "{} {}", a.rms, b.rms);
+        assert!(
+            (b.noise / a.noise - 1.0).abs() < 0.1,
+            "{} {}",
+            a.noise,
+            b.noise
+        );
+    }
+}
+
+/// The same where the motion does not repeat.
+#[test]
+fn what_was_not_measured_has_no_weight_without_periods() {
+    let machine = robots().1;
+    let of = |damage: bool| -> Vec<Record> {
+        let all = logs(&mut |_, _, _, _, _| 0.0);
+        let one = |r: &Record| {
+            let mut c = Channels {
+                t: r.t.clone(),
+                q: r.q.clone(),
+                tau: r.tau.clone(),
+                qref: None,
+            };
+            if damage {
+                for at in [150usize, 520, 1111, 1600] {
+                    let (value, until) = (c.tau[0][at], (at + 50).min(c.t.len()));
+                    c.tau[0][at.min(until)..until].fill(value);
+                }
+                c.q[1][300..330].fill(f64::NAN);
+            }
+            let plant = Plant::from(machine.clone());
+            Record::from_channels(&r.name, c, &plant, r.purpose, None).expect("a log")
+        };
+        all.iter().map(one).collect()
+    };
+    let (a, b) = (diagnosed(&of(false)), diagnosed(&of(true)));
+    assert_eq!(a.verdict, b.verdict);
+    for (a, b) in a.refit.iter().zip(&b.refit) {
+        println!(
+            "{}: {:.4} {:.4}, noise {:.4} {:.4}",
+            a.joint, a.rms, b.rms, a.noise, b.noise
+        );
+        assert!((b.rms - a.rms).abs() < 0.1 * a.noise, "{} {}", a.rms, b.rms);
+        assert!(
+            (b.noise / a.noise - 1.0).abs() < 0.1,
+            "{} {}",
+            a.noise,
+            b.noise
+        );
+    }
+}
+
+/// Logs of which some carry a load: marked as `payload`, or as nothing.
+fn loaded(with: [bool; 4], payload: Payload) -> Vec<Record> {
+    let empty = robots().1;
+    let mut machine = empty.clone();
+    let com = nalgebra::Vector3::new(0.1, 0.02, 0.0);
+    let load = Inertia::from_com(0.8, com, nalgebra::Matrix3::zeros());
+    let body = machine.bodies.last_mut().expect("a body");
+    for (b, l) in body.inertia.0.iter_mut().zip(load.0) {
+        *b += l;
+    }
+    let machines = with.map(|w| if w { &machine } else { &empty });
+    let mut all = logs_of(machines, &mut |_, _, _, _, _| 0.0);
+    for (r, w) in all.iter_mut().zip(with) {
+        r.payload = if w { payload } else { Payload::None };
+    }
+    all
+}
+
+/// A load that the experiment states belongs to the model of its records.
+#[test]
+fn a_known_load_is_no_gap() {
+    let known = Payload::Known {
+        mass: 0.8,
+        com: [0.1, 0.02, 0.0],
+        inertia: None,
+    };
+    let [bare, stated] =
+        [Payload::None, known].map(|p| diagnosed(&loaded([false, true, true, true], p)));
+    let empty = diagnosed(&loaded([false; 4], Payload::None));
+    let rms = |d: &Diagnosis| d.frozen.iter().map(|g| g.rms).collect::<Vec<_>>();
+    println!("{:?} {:?} {:?}", rms(&empty), rms(&stated), rms(&bare));
+    assert_eq!(stated.verdict, Verdict::NoGap, "{:?}", claims(&stated));
+    for ((s, e), b) in rms(&stated).iter().zip(rms(&empty)).zip(rms(&bare)) {
+        assert!((s / e - 1.0).abs() < 0.15, "{s} {e}");
+        assert!(
+            b > 1.5 * e,
+            "the load shows where nothing states it: {b} {e}"
+        );
+    }
+}
+
+/// Records with an unknown load and records of the empty robot are one robot: the load is free, and what
+/// else is wrong is found on all of them.
+#[test]
+fn an_unknown_load_is_estimated_beside_the_effects() {
+    let with = [false, true, false, true];
+    let sound = diagnosed(&loaded(with, Payload::Unknown));
+    assert_eq!(sound.verdict, Verdict::NoGap, "{:?}", claims(&sound));
+    assert!(
+        !sound
+            .findings
+            .iter()
+            .any(|f| f.effect == "payload" && f.confidence >= 0.5)
+    );
+    let remark = sound
+        .records
+        .iter()
+        .flat_map(|r| &r.remarks)
+        .find(|r| r.contains("unknown load"));
+    let remark = remark.expect("what was found of the load");
+    println!("{remark}");
+    let mass: f64 = remark
+        .split(" kg")
+        .next()
+        .and_then(|t| t.rsplit(' ').next())
+        .expect("a mass")
+        .parse()
+        .expect("a number");
+    assert!((mass / 0.8 - 1.0).abs() < 0.1, "{remark}");
+    // the same load, taken for part of the robot on the records that carry it, is a gap
+    let mixed = diagnosed(&loaded(with, Payload::None));
+    let energy = |d: &Diagnosis| -> f64 { d.frozen.iter().map(|g| g.rms.powi(2)).sum() };
+    assert!(
+        energy(&mixed) > 1.5 * energy(&sound),
+        "{} {}",
+        energy(&mixed),
+        energy(&sound)
+    );
+}
+
+/// A load that only holdout records carry cannot be predicted.
+#[test]
+fn a_load_that_nothing_can_tell_is_refused() {
+    let plant = robots().0;
+    let logs = loaded([false, false, false, true], Payload::Unknown);
+    let Err(e) = prepare(&plant, &logs) else {
+        panic!("a load that no fitted record carries");
+    };
+    let text = e.to_string();
+    assert!(
+        text.contains("payload is unknown") && text.contains("mass"),
+        "{text}"
+    );
+}
+
+/// A record that was changed in memory counts as it is, whatever the file says that it was read from.
+#[test]
+fn a_record_in_memory_is_not_read_again() {
+    let plant = robots().0;
+    let clean = logs(&mut |_, _, _, _, _| 0.0).swap_remove(0);
+    let path = std::env::temp_dir().join(format!("excite_memory_{}.csv", std::process::id()));
+    let mut text = String::from("t,q1,q2,tau1,tau2\n");
+    for i in 0..clean.len() {
+        let row = [
+            clean.t[i],
+            clean.q[0][i],
+            clean.q[1][i],
+            clean.tau[0][i],
+            clean.tau[1][i],
+        ];
+        text += &row.map(|v| v.to_string()).join(",");
+        text.push('\n');
+    }
+    std::fs::write(&path, text).expect("a file");
+    let mut record =
+        Record::read(&path, &plant, Purpose::Fit, clean.period).expect("the log again");
+    let torque = |r: &Record| {
+        let data = prepare(&plant, std::slice::from_ref(r)).expect("a record");
+        data.tau[1][200]
+    };
+    let before = torque(&record);
+    record.tau[1].iter_mut().for_each(|v| *v += 3.0);
+    let after = torque(&record);
+    std::fs::remove_file(&path).expect("the file is there");
+    assert!((after - before - 3.0).abs() < 1e-9, "{before} {after}");
 }
 
 fn of_folder(folder: &str) -> Option<Diagnosis> {

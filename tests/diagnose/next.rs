@@ -5,9 +5,9 @@
 
 use crate::common::rehearse::{self, log, within, without_commands};
 use excite::diagnose::next::{NOMINAL, Proposal};
-use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
 use excite::identifiability::assess;
+use excite::log::Record;
 use excite::plant::Plant;
 use excite::simulate::{Effects, Field};
 use excite::trajectory::{Fourier, Trajectory};
@@ -17,7 +17,7 @@ struct Case {
     plant: Plant,
     effects: Effects,
     noise: f64,
-    logs: Vec<Raw>,
+    logs: Vec<Record>,
 }
 
 impl Case {

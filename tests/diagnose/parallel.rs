@@ -4,8 +4,8 @@
 //! `docs/diagnosis.md`.
 
 use crate::common::rehearse::{self, log, within, without_commands};
-use excite::diagnose::record::Raw;
 use excite::diagnose::{Diagnosis, Settings, of_logs};
+use excite::log::Record;
 use excite::mechanism::bundled;
 use excite::plant::Plant;
 use excite::robot::Inertia;
@@ -40,7 +40,7 @@ impl Rehearsal {
 
     /// Logs of the robot `text` at three speeds, ordinary errors of 3 % included; the last is not
     /// fitted to.
-    fn logs(&self, robot: &Plant, effects: Effects) -> Vec<Raw> {
+    fn logs(&self, robot: &Plant, effects: Effects) -> Vec<Record> {
         let speeds = [(5.0, true), (9.0, true), (6.5, false)];
         let settings = rehearse::simulation(Effects {
             perturb: 0.03,

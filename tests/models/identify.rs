@@ -140,6 +140,7 @@ fn record(plant: &Plant, phi: &[f64], purpose: Purpose, run: &Run) -> Record {
         pose: None,
         pressures: None,
         resampled: false,
+        written: None,
         warnings: Vec::new(),
     }
 }
@@ -248,6 +249,7 @@ fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise
             pose: None,
             pressures: None,
             resampled: false,
+            written: None,
             warnings: Vec::new(),
         };
         assert_eq!(record.actuators(), n);

@@ -224,3 +224,63 @@ fn the_cutoff_lies_where_motion_sinks_into_noise() {
     let (k, c) = cutoff::periodic(&parts, 10.0);
     assert!((60..110).contains(&k), "{k} {}", c.frequency);
 }
+
+/// Both derivations give the motion of a log that repeats, from positions with the noise of an encoder; a cut-off
+/// of the positions belongs to one of them only.
+#[test]
+fn the_derivation_is_an_option() {
+    use excite::log::{Channels, Purpose, Record};
+    use excite::plant::Plant;
+    use excite::signals::{Derivation, Prepared, Settings};
+    let plant = Plant::load("planar2").unwrap();
+    let (rate, period) = (200.0, 4.0);
+    let count = 3 * 800;
+    let t: Vec<f64> = (0..count).map(|i| i as f64 / rate).collect();
+    let w = 2.0 * PI / period;
+    let exact = |j: usize, t: f64| {
+        let (a, b) = (0.6 - 0.2 * j as f64, 0.15);
+        let q = a * (w * t).sin() + b * (5.0 * w * t).cos();
+        let qdd = -a * w * w * (w * t).sin() - b * 25.0 * w * w * (5.0 * w * t).cos();
+        [q, qdd]
+    };
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+    let mut noisy = |x: f64| x + 2e-5 * rng.random_range(-1.0..1.0);
+    let q = (0..2)
+        .map(|j| t.iter().map(|t| noisy(exact(j, *t)[0])).collect())
+        .collect();
+    let tau = (0..2)
+        .map(|j| t.iter().map(|t| noisy(exact(j, *t)[1])).collect())
+        .collect();
+    let channels = Channels {
+        t: t.clone(),
+        q,
+        tau,
+        qref: None,
+    };
+    let record =
+        Record::from_channels("made", channels, &plant, Purpose::Fit, Some(period)).unwrap();
+    for derivation in [Derivation::LowPass, Derivation::Wiener] {
+        let settings = Settings {
+            derivation,
+            ..Settings::default()
+        };
+        let p = Prepared::new(&record, &plant, &settings).unwrap();
+        for j in 0..2 {
+            let off: f64 = (0..800)
+                .map(|i| (p.motion.qdd[j * 800 + i] - exact(j, t[i])[1]).powi(2))
+                .sum();
+            let off = (off / 800.0).sqrt();
+            println!(
+                "{derivation:?} joint {j}: {off:.2e} rad/s², {}",
+                p.cutoff_reason
+            );
+            assert!(off < 0.2, "{derivation:?}: {off}");
+        }
+    }
+    let both = Settings {
+        derivation: Derivation::Wiener,
+        position_cutoff: Some(10.0),
+        ..Settings::default()
+    };
+    assert!(Prepared::new(&record, &plant, &both).is_err());
+}

@@ -114,7 +114,7 @@ fn on_joints(robot: &crate::Robot) -> crate::Robot {
 }
 
 /// Motion of that robot: tilts of the base first (x, then y).
-fn extended(r: &Record, tilts: [&[Vec<f64>; 3]; 2]) -> Samples {
+fn extended(r: &Series, tilts: [&[Vec<f64>; 3]; 2]) -> Samples {
     let mut x = Samples::zeros(r.x.dof + 2, r.count);
     for (k, tilt) in tilts.iter().enumerate() {
         let row = k * r.count..(k + 1) * r.count;
@@ -129,10 +129,14 @@ fn extended(r: &Record, tilts: [&[Vec<f64>; 3]; 2]) -> Samples {
     x
 }
 
-/// Bodies of the extended robot: two without mass, then those of the model.
-fn bodies(cx: &Context) -> Vec<f64> {
+/// Bodies of the extended robot: two without mass, then those of the model with the load of record `k`.
+fn bodies(cx: &Context, k: usize) -> Vec<f64> {
     let mut phi = vec![0.0; 20];
     phi.extend(&cx.phi[..10 * cx.data.plant.robot().bodies.len()]);
+    if let (Some(load), Some(tool)) = (cx.data.load(k, &cx.phi), cx.data.plant.tool()) {
+        let body = phi[20 + 10 * tool..].iter_mut().zip(load);
+        body.for_each(|(b, l)| *b += l);
+    }
     phi
 }
 
@@ -152,12 +156,12 @@ impl Load {
         }
         let robot = cx.data.plant.robot();
         let tree = crate::dynamics::Tree::new(&on_joints(robot));
-        let phi = bodies(cx);
         let mut out = Load {
             moment: Default::default(),
             mass: Default::default(),
         };
-        for r in &cx.data.records {
+        for (k, r) in cx.data.records.iter().enumerate() {
+            let phi = bodies(cx, k);
             let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
             let mut turning = still.clone();
             turning[2].fill(1.0);
@@ -185,19 +189,19 @@ impl Load {
 /// of a tilt of record `k` about axis 0 or 1, per unit of its coefficient.
 pub(crate) fn tilted(
     cx: &Context,
-    motion: impl Fn(&Record, usize, usize) -> [Vec<f64>; 3],
+    motion: impl Fn(&Series, usize, usize) -> [Vec<f64>; 3],
 ) -> Vec<Column> {
     if !cx.serial() {
         return Vec::new();
     }
     let robot = cx.data.plant.robot();
     let tree = crate::dynamics::Tree::new(&on_joints(robot));
-    let phi = bodies(cx);
     let n = cx.data.joints();
     (0..2)
         .map(|axis| {
             let mut rows = vec![Vec::with_capacity(cx.data.rows()); n];
             for (k, r) in cx.data.records.iter().enumerate() {
+                let phi = bodies(cx, k);
                 let full = motion(r, k, axis);
                 let largest = full[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
                 let step = 1e-4 / largest;

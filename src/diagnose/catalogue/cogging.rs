@@ -75,8 +75,9 @@ pub(crate) fn orders(cx: &Context, j: usize) -> Vec<Shape> {
     }
     // residual of the model against position, line by line
     let fitted = cx.data.fitted;
+    let weights = &cx.data.measured()[..fitted];
     let residual: Vec<f64> = (0..fitted)
-        .map(|i| cx.data.tau[j][i] - cx.model[j][i])
+        .map(|i| weights[i] * (cx.data.tau[j][i] - cx.model[j][i]))
         .collect();
     let mut position = Vec::with_capacity(fitted);
     for r in cx.data.records.iter().filter(|r| r.fit) {

@@ -2,12 +2,14 @@
 
 use super::base_compliance;
 use super::estimate::{Place, Quantity};
-use crate::diagnose::data::{self, Column, Data, averaged};
-use crate::diagnose::record::Record;
+use crate::diagnose::column::Column;
+use crate::diagnose::data::Data;
+use crate::diagnose::window::{averaged, sign};
 use crate::dynamics::Samples;
 use crate::mechanism::MechanismMotion;
 use crate::plant::Kind;
 use crate::robot::{JointTerm, Motion};
+use crate::signals::series::Series;
 use std::sync::OnceLock;
 
 /// State of the diagnosis that columns may depend on.
@@ -123,7 +125,7 @@ impl<'a> Context<'a> {
     /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
     pub fn sign(&self, j: usize) -> Vec<f64> {
         let width = 1e-3 * self.data.speed[j];
-        self.data.own(j, |_, v| data::sign(v, width))
+        self.data.own(j, |_, v| sign(v, width))
     }
 
     /// Change of the rigid-body torque of all actuators when coordinate `j` moves by a small `δ`
@@ -132,7 +134,7 @@ impl<'a> Context<'a> {
     pub fn displaced(
         &self,
         j: usize,
-        delta: impl Fn(&Record, usize) -> [Vec<f64>; 3] + Sync,
+        delta: impl Fn(&Series, usize) -> [Vec<f64>; 3] + Sync,
     ) -> Column {
         let n = self.data.joints();
         let side = |sign: f64| {

@@ -69,7 +69,7 @@ fn carries(cx: &Context, robot: &crate::Robot, j: usize) -> bool {
             x.q[k * x.count + i] = r.x.q[k * r.count + i * (r.count - 1) / 15];
         }
     }
-    let weight = crate::diagnose::data::rigid(cx.data.plant, &cx.phi, &x);
+    let weight = crate::diagnose::rigid::rigid(cx.data.plant, &cx.phi, None, &x);
     weight.is_ok_and(|w| {
         let row = &w[j * x.count..(j + 1) * x.count];
         row.iter().any(|v| v.abs() > 0.02 * cx.peak[j])

@@ -37,24 +37,24 @@ impl Effect for JointCoupling {
         };
         let s = shape[0];
         let width = 1e-3 * (cx.data.speed[j] + cx.data.speed[k]);
-        let sum = |r: &Record, of: fn(&Record, usize) -> Vec<f64>| -> Vec<f64> {
+        let sum = |r: &Series, of: fn(&Series, usize) -> Vec<f64>| -> Vec<f64> {
             of(r, j)
                 .iter()
                 .zip(of(r, k))
                 .map(|(a, b)| a + s * b)
                 .collect()
         };
-        let position = |r: &Record, i: usize| r.state(i).0.to_vec();
-        let velocity = |r: &Record, i: usize| r.state(i).1.to_vec();
-        let acceleration = |r: &Record, i: usize| r.acceleration(i).to_vec();
+        let position = |r: &Series, i: usize| r.state(i).0.to_vec();
+        let velocity = |r: &Series, i: usize| r.state(i).1.to_vec();
+        let acceleration = |r: &Series, i: usize| r.acceleration(i).to_vec();
         let both = |x: Vec<f64>| Column {
             rows: vec![(j, x.clone()), (k, x.iter().map(|v| s * v).collect())],
         };
         let mut coulomb = Vec::with_capacity(cx.data.rows());
         for r in &cx.data.records {
             let (q, v, a) = (sum(r, position), sum(r, velocity), sum(r, acceleration));
-            let f = |_, v| crate::diagnose::data::sign(v, width);
-            crate::diagnose::data::fine(&q, &v, &a, r.dt, f, &mut coulomb);
+            let f = |_, v| crate::diagnose::window::sign(v, width);
+            crate::diagnose::window::fine(&q, &v, &a, r.dt, f, &mut coulomb);
         }
         vec![
             both(coulomb),

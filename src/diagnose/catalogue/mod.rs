@@ -43,12 +43,12 @@ mod viscous_friction;
 pub use context::Context;
 pub use estimate::{Estimate, Place, Quantity, Shape, Value};
 
-use super::data::Column;
-use super::record::Record;
+use super::column::Column;
 use crate::dynamics::Samples;
 use crate::export::Part;
 use crate::plant::Kind;
 use crate::robot::{Inertia, JointTerm, Motion, Robot};
+use crate::signals::series::Series;
 use context::{closed_column, ladder, projected, prune, smooth};
 use estimate::{constant, value};
 

@@ -50,7 +50,7 @@ impl Effect for PassiveJointFriction {
                 gamma
             })
         };
-        let dry = friction(&|v, top| crate::diagnose::data::sign(v, 2e-3 * top));
+        let dry = friction(&|v, top| crate::diagnose::window::sign(v, 2e-3 * top));
         let viscous = friction(&|v, _| v);
         dry.into_iter().chain(viscous).collect()
     }

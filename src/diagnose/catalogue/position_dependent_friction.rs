@@ -36,7 +36,7 @@ impl Effect for PositionDependentFriction {
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let width = 1e-3 * cx.data.speed[j];
-        let sign = |v: f64| crate::diagnose::data::sign(v, width);
+        let sign = |v: f64| crate::diagnose::window::sign(v, width);
         vec![
             Column::on(j, cx.data.own(j, |q, v| (shape[0] * q).sin() * sign(v))),
             Column::on(j, cx.data.own(j, |q, v| (shape[0] * q).cos() * sign(v))),

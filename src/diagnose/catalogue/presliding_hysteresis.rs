@@ -47,11 +47,11 @@ impl Effect for PreslidingHysteresis {
             for q in &q[..settle] {
                 z.step(*q);
             }
-            let values = crate::diagnose::data::fine_values(q, v, a, r.dt, |q, v, _| {
-                z.step(q) - crate::diagnose::data::sign(v, width)
+            let values = crate::diagnose::window::fine_values(q, v, a, r.dt, |q, v, _| {
+                z.step(q) - crate::diagnose::window::sign(v, width)
             });
             let mut out = Vec::with_capacity(r.count);
-            crate::diagnose::data::from_fine(&values, r.count, &mut out);
+            crate::diagnose::window::from_fine(&values, r.count, &mut out);
             out
         });
         vec![Column::on(j, values)]

@@ -1,6 +1,6 @@
 //! A mass on springs, with or without a gap between them.
 
-use crate::diagnose::data::{FINE, from_fine};
+use crate::diagnose::window::{FINE, from_fine};
 
 /// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J`, where `T`
 /// is the torque of flanks at `±b/2` with springs of `M (2πf)²` and a damping ratio; the springs

@@ -35,7 +35,7 @@ impl Effect for StribeckFriction {
         let j = place.first();
         let width = 1e-3 * cx.data.speed[j];
         let rise = |v: f64| {
-            crate::diagnose::data::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
+            crate::diagnose::window::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
         };
         vec![Column::on(j, cx.data.own(j, |_, v| rise(v)))]
     }

@@ -1,11 +1,13 @@
 //! One test over all effects: what each of them promises.
 
 use super::*;
-use crate::diagnose::data::{Data, averaged};
+use crate::diagnose::data::Data;
 use crate::diagnose::evidence::{Evidence, Projected};
+use crate::diagnose::window::averaged;
 use crate::export::{self, Model};
 use crate::mechanism::Mechanism;
 use crate::plant::Plant;
+use crate::signals::series::Series;
 use rand::{Rng, SeedableRng};
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -68,9 +70,9 @@ fn motion(plant: &Plant) -> Samples {
     x
 }
 
-fn record(plant: &Plant, x: &Samples, tau: Vec<f64>) -> Record {
+fn record(plant: &Plant, x: &Samples, tau: Vec<f64>) -> Series {
     let n = plant.actuators().len();
-    Record {
+    Series {
         name: "test".into(),
         fit: true,
         dt: PERIOD / COUNT as f64,
@@ -80,8 +82,10 @@ fn record(plant: &Plant, x: &Samples, tau: Vec<f64>) -> Record {
         x: x.clone(),
         reference: None,
         tau,
+        measured: vec![true; x.count],
         position_noise: vec![0.0; n],
         band: 20.0,
+        payload: crate::log::Payload::None,
         order: 0,
         remarks: Vec::new(),
     }

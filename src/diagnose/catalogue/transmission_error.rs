@@ -37,12 +37,12 @@ impl Effect for TransmissionError {
                 let (q, v) = r.state(j);
                 let a = r.acceleration(j);
                 let mut i = 0;
-                let values = crate::diagnose::data::fine_values(q, v, a, r.dt, |q, v, _| {
-                    let a = a[(i / crate::diagnose::data::FINE).min(a.len() - 1)];
+                let values = crate::diagnose::window::fine_values(q, v, a, r.dt, |q, v, _| {
+                    let a = a[(i / crate::diagnose::window::FINE).min(a.len() - 1)];
                     i += 1;
                     a / k * (k * q + phase).cos() - v * v * (k * q + phase).sin()
                 });
-                crate::diagnose::data::from_fine(&values, r.count, &mut all);
+                crate::diagnose::window::from_fine(&values, r.count, &mut all);
             }
             cx.inertial(j, &all, draft)
         };

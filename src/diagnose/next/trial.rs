@@ -4,8 +4,10 @@ use super::motions::PERIODS;
 use crate::diagnose::catalogue::{Context, Effect, Place, Shape};
 use crate::diagnose::data::Data;
 use crate::diagnose::evidence::{Evidence, Projected};
-use crate::diagnose::record::Record;
-use crate::diagnose::{Finding, search};
+use crate::diagnose::finding::Finding;
+use crate::diagnose::search;
+use crate::log::Payload;
+use crate::signals::series::Series;
 use crate::trajectory::Fourier;
 
 /// How closely a motion is looked at: most samples of a period, and shapes of an effect.
@@ -162,7 +164,7 @@ impl Trial<'_> {
         let count = wanted.clamp(64, detail.samples);
         let x = motion.motion(count);
         let n = self.data.joints();
-        let record = Record {
+        let record = Series {
             name: "next".into(),
             fit: true,
             dt: motion.period / count as f64,
@@ -172,8 +174,10 @@ impl Trial<'_> {
             x,
             reference: None,
             tau: vec![0.0; n * count],
+            measured: vec![true; count],
             position_noise: vec![0.0; n],
             band: 20.0,
+            payload: Payload::None,
             order: 0,
             remarks: Vec::new(),
         };
@@ -182,13 +186,16 @@ impl Trial<'_> {
         data.ordinary();
         data.tighten(self.data.closeness);
         data.window = self.data.window;
-        if data.parameters.len() != self.phi.len() {
+        // the robot would run it empty, and an unknown load has the last parameters
+        let phi = self.phi.get(..data.parameters.len())?;
+        let empty = self.data.free_load.unwrap_or(self.phi.len());
+        if data.parameters.len() != empty {
             return None;
         }
         // k times as many rows weigh the prior as k times its variance would
         let rows = f64::from(PERIODS) * wanted as f64 / count as f64;
         let evidence = Evidence::new(&data, rows.max(1.0).sqrt());
-        let cx = Context::new(&data, self.phi.to_vec()).ok()?;
+        let cx = Context::new(&data, phi.to_vec()).ok()?;
         Some(
             of.iter()
                 .map(|t| t.overlap(&evidence, &cx, detail.shapes))

@@ -1,0 +1,186 @@
+//! Effects in the result: members of the set that was fitted, and what could stand in their place.
+
+use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value};
+use super::evidence::{Evidence, Projected};
+use super::interval;
+use super::verdict::Decision;
+
+/// One effect in the result.
+#[derive(Debug, Clone)]
+pub struct Finding {
+    /// name, as in `formats.md`
+    pub effect: &'static str,
+    /// name in sentences
+    pub title: &'static str,
+    /// equation of the catalogue
+    pub equation: &'static str,
+    /// what tells it apart
+    pub separated_by: &'static str,
+    /// names of the actuators; empty for the whole robot
+    pub joints: Vec<String>,
+    /// where
+    pub place: Place,
+    /// shape
+    pub shape: Shape,
+    /// coefficients
+    pub eta: Vec<f64>,
+    /// 0 to 1; a claim from 0.5 on
+    pub confidence: f64,
+    /// share of the gap on fitted records
+    pub explains: f64,
+    /// 95 % interval of it
+    pub interval: [f64; 2],
+    /// share of the gap on holdout records
+    pub holdout: f64,
+    /// share of the effect that the nominal model cannot absorb
+    pub visibility: f64,
+    /// the most that a decoy, the effect moved in time, gains of its own over what the effect gains; of
+    /// members of the set
+    pub decoys: Option<f64>,
+    /// what coefficients of their own for every fitted record gain over what the effect gains; of members
+    pub unsteady: Option<f64>,
+    /// parameters
+    pub values: Vec<Value>,
+    /// effects that this data cannot tell from it
+    pub same: Vec<&'static str>,
+    /// whether it is part of the set that was fitted, or only a rival
+    pub member: bool,
+    /// whether it shows against the prior of the parameters, not in a refitted residual
+    pub frozen: bool,
+}
+
+/// Members and rivals of a decision, by falling confidence; `seed` is that of the intervals.
+pub fn findings(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    decision: &Decision,
+    seed: u64,
+) -> Vec<Finding> {
+    let mut all = members(evidence, cx, effects, decision, seed);
+    rivals(&mut all, cx, effects, decision);
+    all.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    all
+}
+
+fn names(cx: &Context, place: &Place) -> Vec<String> {
+    let actuators = cx.data.plant.actuators();
+    let named = place.named().into_iter();
+    named.map(|j| actuators[j].name.clone()).collect()
+}
+
+fn estimate(place: Place, shape: &Shape, eta: &[f64], std: &[f64]) -> Estimate {
+    Estimate {
+        place,
+        shape: shape.clone(),
+        eta: eta.to_vec(),
+        std: std.to_vec(),
+    }
+}
+
+fn members(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    decision: &Decision,
+    seed: u64,
+) -> Vec<Finding> {
+    let data = evidence.data;
+    let members = decision.projected();
+    let scatter = |set: &[&Projected]| -> Vec<Vec<f64>> {
+        evidence.unwhitened(&evidence.residual(set, &evidence.fit(set)))
+    };
+    let (all, gap) = (scatter(&members), scatter(&[]));
+    let mut findings = Vec::new();
+    for (i, m) in decision.members.iter().enumerate() {
+        let mut rest = members.clone();
+        rest.remove(i);
+        let total = match m.frozen {
+            true => &evidence.unwhitened(&evidence.r),
+            false => &gap,
+        };
+        let without = scatter(&rest);
+        let interval = interval::explained(data, total, &without, &all, m.explains, seed);
+        let c = &m.candidate;
+        let effect = effects[c.effect].as_ref();
+        let card = effect.card();
+        let mut same: Vec<&'static str> = Vec::new();
+        for r in m.rivals.iter().filter(|r| r.weight > 0.25) {
+            let rival = effects[r.effect].card().name;
+            if rival != card.name && !same.contains(&rival) {
+                same.push(rival);
+            }
+        }
+        findings.push(Finding {
+            effect: card.name,
+            title: card.title,
+            equation: card.equation,
+            separated_by: card.separated_by,
+            joints: names(cx, &c.place),
+            place: c.place,
+            shape: c.shape.clone(),
+            eta: c.eta.clone(),
+            confidence: m.confidence,
+            explains: m.explains,
+            interval,
+            holdout: m.holdout,
+            visibility: m.visibility,
+            decoys: m.decoys,
+            unsteady: m.unsteady,
+            values: effect.values(cx, &estimate(c.place, &c.shape, &c.eta, &m.std)),
+            same,
+            member: true,
+            frozen: m.frozen,
+        });
+    }
+    findings
+}
+
+/// What could stand in the place of a member, with what is left of its confidence.
+fn rivals(
+    findings: &mut Vec<Finding>,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    decision: &Decision,
+) {
+    for (m, of) in decision.members.iter().enumerate() {
+        let mut seen: Vec<usize> = Vec::new();
+        for r in &of.rivals {
+            let (effect, card) = (effects[r.effect].as_ref(), effects[r.effect].card());
+            let known = findings.iter().any(|f| f.effect == card.name);
+            if seen.len() >= 4 || r.weight < 0.01 || seen.contains(&r.effect) || known {
+                continue;
+            }
+            seen.push(r.effect);
+            let main = &findings[m];
+            findings.push(Finding {
+                effect: card.name,
+                title: card.title,
+                equation: card.equation,
+                separated_by: card.separated_by,
+                joints: names(cx, &r.place),
+                place: r.place,
+                shape: r.shape.clone(),
+                eta: r.eta.clone(),
+                confidence: (main.confidence * r.weight).min(0.49),
+                explains: main.explains * (1.0 - r.loss).clamp(0.0, 1.0),
+                interval: main.interval.map(|v| v * (1.0 - r.loss).clamp(0.0, 1.0)),
+                holdout: main.holdout * (1.0 - r.loss).clamp(0.0, 1.0),
+                visibility: of.visibility,
+                decoys: None,
+                unsteady: None,
+                values: effect.values(
+                    cx,
+                    &estimate(r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
+                ),
+                same: if r.weight > 0.25 {
+                    vec![main.effect]
+                } else {
+                    Vec::new()
+                },
+                member: false,
+                frozen: main.frozen,
+            });
+        }
+    }
+}

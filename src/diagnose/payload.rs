@@ -1,0 +1,181 @@
+//! What the robot carried in each record.
+//!
+//! A load is ten more parameters `π` of the body that carries it, so its torque is `Y_tool(x, ẋ, ẍ) π`.
+//! A load that is known is part of the nominal model of its records: mass and centre of mass as the
+//! experiment states them, a point mass where it states no inertia. Records with an unknown load share
+//! one load, whose ten parameters are free, with columns that are zero on the records of the empty
+//! robot. So both kinds of record are one robot, and no effect can stand in the place of the load.
+
+use super::column::Column;
+use super::data::Data;
+use super::window::averaged;
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::log::{self, Payload, Purpose};
+use crate::plant::Plant;
+use crate::robot::Inertia;
+use crate::signals::series::Series;
+use nalgebra::Matrix3;
+
+/// Ten parameters of a load about the origin of the frame of the body that carries it.
+pub type Load = [f64; 10];
+
+/// Standard deviations of an unknown load: wide enough to leave it free. Mass in kg, first moments in
+/// kg m, tensor in kg m².
+const FREE: [f64; 3] = [1e3, 1e3, 1e3];
+
+/// Names of the free parameters.
+const NAMES: [&str; 10] = [
+    "load.m", "load.mx", "load.my", "load.mz", "load.xx", "load.xy", "load.xz", "load.yy",
+    "load.yz", "load.zz",
+];
+
+/// Whether the loads of these records can be honoured.
+///
+/// # Errors
+/// A load on a robot without bodies; an unknown load that only holdout records carry, which nothing
+/// can tell.
+pub fn check(plant: &Plant, logs: &[log::Record]) -> Result<()> {
+    let Some(loaded) = logs.iter().find(|r| r.payload != Payload::None) else {
+        return Ok(());
+    };
+    if plant.tool().is_none() {
+        return Err(Error::Infeasible(format!(
+            "{}: it states a payload, but {} has no body that could carry one",
+            loaded.name,
+            plant.name()
+        )));
+    }
+    let unknown = |r: &&log::Record| r.payload == Payload::Unknown;
+    let fitted = |r: &log::Record| r.purpose == Purpose::Fit;
+    match logs.iter().find(unknown) {
+        Some(held) if !logs.iter().filter(unknown).any(fitted) => Err(Error::Infeasible(format!(
+            "{}: its payload is unknown, and no record with use = \"fit\" carries it, so its torque cannot be \
+             predicted; state it as payload = {{ mass = …, com = […] }}, or fit to a record with it",
+            held.name
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// What the payloads leave open.
+pub fn warnings(logs: &[log::Record]) -> Vec<Warning> {
+    let open = |r: &log::Record| r.payload == Payload::Unknown;
+    match logs.iter().any(open) && !logs.iter().any(|r| r.payload == Payload::None) {
+        true => vec![Warning::new(
+            WarningKind::NominalModelAssumed,
+            "payload",
+            "there is no record of the empty robot (payload = \"none\"): the unknown load takes up every \
+             error of the mass and inertia of the last body",
+        )],
+        false => Vec::new(),
+    }
+}
+
+/// The load that a payload states.
+fn stated(payload: Payload) -> Option<Load> {
+    let Payload::Known { mass, com, inertia } = payload else {
+        return None;
+    };
+    let [xx, xy, xz, yy, yz, zz] = inertia.unwrap_or_default();
+    let tensor = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    Some(Inertia::from_com(mass, com.into(), tensor).0)
+}
+
+impl Data<'_> {
+    /// Takes the loads of the records in: torques of known ones, and free parameters of the unknown one.
+    ///
+    /// # Errors
+    /// Poses that cannot be reached.
+    pub fn carry(&mut self) -> Result<()> {
+        let none = |r: &Series| r.payload == Payload::None;
+        let Some(tool) = self.plant.tool().filter(|_| !self.records.iter().all(none)) else {
+            return Ok(());
+        };
+        let n = self.joints();
+        let mut columns: Vec<Vec<Vec<f64>>> = vec![vec![vec![0.0; self.rows()]; n]; 10];
+        for (k, r) in self.records.iter().enumerate().filter(|(_, r)| !none(r)) {
+            let w = self.plant.body_columns(tool, &r.x)?;
+            for (c, column) in columns.iter_mut().enumerate() {
+                for (j, row) in column.iter_mut().enumerate() {
+                    let tau: Vec<f64> = (0..r.count).map(|i| w[(j * r.count + i, c)]).collect();
+                    averaged(&tau, &mut row[self.start[k]..self.start[k + 1]]);
+                }
+            }
+        }
+        for k in 0..self.records.len() {
+            let Some(load) = stated(self.records[k].payload) else {
+                continue;
+            };
+            for (column, value) in columns.iter().zip(load) {
+                for (known, row) in self.known.iter_mut().zip(column) {
+                    for i in self.start[k]..self.start[k + 1] {
+                        known[i] += value * row[i];
+                    }
+                }
+            }
+        }
+        self.tool = columns
+            .iter()
+            .map(|rows| Column {
+                rows: rows.iter().cloned().enumerate().collect(),
+            })
+            .collect();
+        let unknown = |k: usize| self.records[k].payload == Payload::Unknown;
+        if (0..self.records.len()).any(unknown) {
+            for rows in columns.iter_mut().flatten() {
+                for k in (0..self.records.len()).filter(|k| !unknown(*k)) {
+                    rows[self.start[k]..self.start[k + 1]].fill(0.0);
+                }
+            }
+            let free = NAMES.iter().zip(columns).enumerate();
+            let free = free.map(|(c, (name, rows))| {
+                let rows = rows.into_iter().enumerate().collect();
+                (
+                    *name,
+                    Column { rows },
+                    FREE[[0, 1, 1, 1, 2, 2, 2, 2, 2, 2][c]],
+                )
+            });
+            self.free_load = Some(self.parameters.len());
+            self.add_nuisances(&free.collect::<Vec<_>>());
+        }
+        Ok(())
+    }
+
+    /// Starts from the load that a fit has found in the place of none, so that the gap of the model as it
+    /// is does not contain it.
+    pub fn start_from_load(&mut self, phi: &[f64]) {
+        if let Some(at) = self.free_load {
+            for c in at..at + 10 {
+                self.parameters[c].value = phi[c];
+            }
+        }
+    }
+
+    /// What the robot carries in record `k`, with the parameters `phi`.
+    pub fn load(&self, k: usize, phi: &[f64]) -> Option<Load> {
+        match self.records[k].payload {
+            Payload::None => None,
+            Payload::Unknown => {
+                let at = self.free_load?;
+                phi.get(at..at + 10)?.try_into().ok()
+            }
+            known => stated(known),
+        }
+    }
+
+    /// The unknown load of a fit, in words.
+    pub fn free_load_in_words(&self, phi: &[f64]) -> Option<String> {
+        let at = self.free_load?;
+        let m = phi[at];
+        Some(match m.abs() > 1e-6 {
+            true => format!(
+                "it carries an unknown load, estimated beside the effects: {m:.3} kg at ({:.3}, {:.3}, {:.3}) m",
+                phi[at + 1] / m,
+                phi[at + 2] / m,
+                phi[at + 3] / m
+            ),
+            false => "it carries an unknown load, of which this motion shows nothing".into(),
+        })
+    }
+}

@@ -1,0 +1,90 @@
+//! How far the parameters of a nominal model may be off: what is ordinary for a model of its origin.
+
+use super::noise::Noise;
+use crate::plant::{Kind, Parameter, Plant};
+use crate::robot::{JointTerm, Prior};
+
+/// Factors on the deviations of the prior: of masses, first moments and rotors, and of tensors.
+pub type Closeness = [f64; 2];
+
+/// Factor of every parameter of the nominal model.
+pub fn factors(parameters: &[Parameter], closeness: Closeness) -> Vec<f64> {
+    let of = |kind: &Kind| match kind {
+        Kind::Inertial { k, .. } => closeness[usize::from(*k > 3)],
+        Kind::Term {
+            term: JointTerm::Armature,
+            ..
+        } => closeness[0],
+        Kind::Term { .. } | Kind::Nuisance => 1.0,
+    };
+    parameters.iter().map(|p| of(&p.kind)).collect()
+}
+
+/// Standard deviations of the parameters a priori, from the robot's file, the noise of the torques and
+/// the largest speeds of the actuators.
+pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &[f64]) -> Vec<f64> {
+    let robot = plant.robot();
+    let identified = plant.prior() == Prior::Identified;
+    let heaviest = robot
+        .bodies
+        .iter()
+        .map(|b| b.inertia.mass())
+        .fold(0.0, f64::max);
+    let actuated = plant.actuated();
+    let size = |b: usize| -> f64 {
+        // length of a link: where the next one starts, its centre of mass, its radius of gyration
+        let body = &robot.bodies[b];
+        let next = robot
+            .bodies
+            .iter()
+            .filter(|c| c.parent == Some(b))
+            .map(|c| c.position.norm())
+            .fold(0.0, f64::max);
+        let m = body.inertia.mass().max(1e-9);
+        let about = (body.inertia.tensor().trace().max(0.0) / (2.0 * m)).sqrt();
+        next.max(about).max(0.03)
+    };
+    parameters
+        .iter()
+        .map(|p| match p.kind {
+            Kind::Inertial { body, k } => {
+                let m = robot.bodies[body]
+                    .inertia
+                    .mass()
+                    .max(0.02 * heaviest)
+                    .max(1e-3);
+                let l = size(body);
+                let [mass, first, second] = match identified {
+                    true => [0.015, 0.006, 0.008],
+                    false => [0.2, 0.1, 0.12],
+                };
+                match k {
+                    0 => mass * m,
+                    1..=3 => first * m * l,
+                    _ => second * m * l * l,
+                }
+            }
+            Kind::Term { joint, term } => {
+                let terms = robot.joints[joint].terms;
+                let value = p.value.abs();
+                let j = actuated.iter().position(|a| *a == joint);
+                let noise = j.map_or(0.0, |j| noise[j].std);
+                let speed = j.map_or(1.0, |j| speed[j]);
+                let friction = terms[2].abs() + 0.3 * terms[1].abs() * speed;
+                match (term, identified) {
+                    (JointTerm::Armature, true) => 0.06 * value,
+                    (JointTerm::Armature, false) => 0.3 * value,
+                    (JointTerm::Viscous, true) => 0.15 * value,
+                    (JointTerm::Viscous, false) => 0.4 * value,
+                    (JointTerm::Coulomb, true) => 0.06 * value,
+                    (JointTerm::Coulomb, false) => 0.35 * value,
+                    (JointTerm::Offset, true) => (0.04 * friction).max(0.3 * noise),
+                    (JointTerm::Offset, false) => (0.2 * friction).max(noise),
+                }
+                .max(0.02 * noise)
+            }
+            // each states its own
+            Kind::Nuisance => 0.0,
+        })
+        .collect()
+}

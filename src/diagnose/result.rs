@@ -1,0 +1,154 @@
+//! Result of a diagnosis.
+
+use super::catalogue::Effect;
+use super::data::Data;
+use super::finding::Finding;
+use super::forward::Forward;
+use super::gap::{self, JointGap, Shares};
+use super::improve::Improved;
+use super::next::{INVISIBLE, Proposal};
+use super::noise::Source;
+use super::prior::Closeness;
+use super::search::Candidate;
+use super::traces::Trace;
+use super::verdict::Verdict;
+use crate::error::Warning;
+use crate::log::Payload;
+use crate::signals::series::Series;
+
+/// Energy of the gap in one record before and after the set, in units of the noise variance a sample.
+#[derive(Debug, Clone)]
+pub struct RecordGap {
+    /// name
+    pub name: String,
+    /// whether it was fitted to
+    pub fit: bool,
+    /// by actuator: frozen, refitted, with the effects
+    pub joints: Vec<[f64; 3]>,
+    /// whether periods repeat
+    pub repeats: bool,
+    /// remarks
+    pub remarks: Vec<String>,
+}
+
+/// Result of a diagnosis.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// robot
+    pub robot: String,
+    /// names of the actuators
+    pub joints: Vec<String>,
+    /// units of their torques
+    pub units: Vec<&'static str>,
+    /// verdict
+    pub verdict: Verdict,
+    /// effects by falling confidence
+    pub findings: Vec<Finding>,
+    /// gap of the frozen model, fitted records
+    pub frozen: Vec<JointGap>,
+    /// gap after a refit under the prior
+    pub refit: Vec<JointGap>,
+    /// gap with the effects
+    pub explained: Vec<JointGap>,
+    /// odd, even, non-periodic
+    pub shares: Shares,
+    /// records
+    pub records: Vec<RecordGap>,
+    /// gap energy on holdout before and after
+    pub holdout: [f64; 2],
+    /// share of the gap that stays
+    pub unexplained: f64,
+    /// share of the gap that any function of the state could explain, by cross-validation between
+    /// periods of state bins; `None` where there is nothing to explain
+    pub bound: Option<f64>,
+    /// figures
+    pub traces: Vec<Trace>,
+    /// where the noise floor comes from
+    pub noise_source: String,
+    /// effects that this motion cannot show: name, joint, visibility
+    pub untestable: Vec<(&'static str, String, f64)>,
+    /// parameters of the nominal model as fitted beside the effects
+    pub phi: Vec<f64>,
+    /// the model with the effects that were claimed
+    pub improved: Improved,
+    /// proposal for the next experiment
+    pub next: Option<Proposal>,
+    /// the robot simulated under the recorded torques, before and after
+    pub forward: Forward,
+    /// warnings
+    pub warnings: Vec<Warning>,
+    /// threshold and scale: penalty of the prior before and after
+    pub surprise: [f64; 2],
+    /// factors on the deviations of the prior that the records find likeliest
+    pub closeness: Closeness,
+    /// window of the torque channel, samples squared beyond ±1 sample
+    pub window: f64,
+}
+
+/// Residuals in units of the noise.
+pub fn scaled(data: &Data, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    residual
+        .iter()
+        .enumerate()
+        .map(|(j, e)| e.iter().map(|v| v / data.noise[j].std).collect())
+        .collect()
+}
+
+/// Energies of the gap record by record from residuals in N m or N: of the frozen model, refitted, and
+/// with the effects, which goes with the parameters `phi`.
+pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec<RecordGap> {
+    let all = residuals.map(|e| scaled(data, e));
+    let remarks = |r: &Series| {
+        let unknown = r.payload == Payload::Unknown;
+        let load = data.free_load_in_words(phi).filter(|_| unknown);
+        r.remarks.iter().cloned().chain(load).collect()
+    };
+    data.records
+        .iter()
+        .enumerate()
+        .map(|(k, r)| RecordGap {
+            name: r.name.clone(),
+            fit: r.fit,
+            joints: (0..data.joints())
+                .map(|j| {
+                    std::array::from_fn(|i| {
+                        let (a, b) = gap::excess(r, &all[i][j][data.span(k)]);
+                        ((a + b) / r.sound() as f64 - data.noise[j].excess).max(0.0)
+                    })
+                })
+                .collect(),
+            repeats: r.cycle.is_some(),
+            remarks: remarks(r),
+        })
+        .collect()
+}
+
+/// Effects that the nominal model absorbs to more than 99 % in this motion.
+pub fn untestable(
+    data: &Data,
+    list: &[Candidate],
+    effects: &[Box<dyn Effect>],
+) -> Vec<(&'static str, String, f64)> {
+    let names = data.plant.actuators();
+    let mut out = Vec::new();
+    for c in list {
+        let visibility = c.projected.visibility(None);
+        if visibility < INVISIBLE {
+            let named = c.place.named().into_iter();
+            let place: Vec<&str> = named.map(|j| names[j].name.as_str()).collect();
+            out.push((effects[c.effect].card().name, place.join(", "), visibility));
+        }
+    }
+    out
+}
+
+/// Where the noise floor comes from, in words.
+pub fn noise_source(data: &Data) -> &'static str {
+    match data.noise[0].source {
+        Source::Periods => "the scatter between repeated periods",
+        Source::HighBand => {
+            "the residual above the band of the motion (no record repeats, so that noise below it is \
+             assumed to be as high)"
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! Positions limited to a band, with their derivatives.
+//!
+//! Where the motion repeats, position, velocity and acceleration are one Fourier series over all
+//! periods, `q(t) = Σ_h c_h e^{i h ω t}`, each line weighted by `max(0, 1 − σ²/|c_h|²)` (Wiener)
+//! with the noise `σ²` of the scatter between periods, or of the encoder's steps where a motion that
+//! repeats exactly hides them in every period alike. Differentiation is exact and needs no
+//! filter. Otherwise the positions pass a zero-phase low-pass and central differences.
+
+use super::repeats::scatter;
+use crate::dynamics::Samples;
+use std::f64::consts::PI;
+
+/// Highest frequency of the Fourier series of a repeating motion, Hz.
+pub const BAND: f64 = 30.0;
+
+/// Fourier series of the mean period, with its derivatives, over the whole record. `steps` are
+/// the variances of the encoders' steps by actuator.
+fn periodic(
+    q: &[f64],
+    steps: &[f64],
+    count: usize,
+    (cycle, free): (usize, usize),
+    dt: f64,
+) -> (Samples, Vec<f64>, f64) {
+    let n = steps.len();
+    let periods = count / cycle;
+    let period = cycle as f64 * dt;
+    let omega = 2.0 * PI / period;
+    let lines = ((BAND * period) as usize).min(cycle / 2 - 1).max(1);
+    let variance = scatter(q, n, count, cycle, free);
+    let mut out = Samples::zeros(n, count);
+    let mut band: f64 = 0.0;
+    let turn: Vec<(f64, f64)> = (0..cycle)
+        .map(|i| (2.0 * PI * i as f64 / cycle as f64).sin_cos())
+        .collect();
+    for j in 0..n {
+        let row = &q[j * count..(j + 1) * count];
+        let mean: Vec<f64> = (0..cycle)
+            .map(|i| (0..periods).map(|p| row[p * cycle + i]).sum::<f64>() / periods as f64)
+            .collect();
+        let mut one = [vec![0.0; cycle], vec![0.0; cycle], vec![0.0; cycle]];
+        let centre = mean.iter().sum::<f64>() / cycle as f64;
+        one[0].fill(centre);
+        // variance of a complex line of the mean period; the part of the steps that does not scatter
+        // is the same in every period
+        let hidden = (steps[j] - variance[j]).max(0.0);
+        let floor = variance[j] / count as f64 + hidden / cycle as f64;
+        for h in 1..=lines {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (i, x) in mean.iter().enumerate() {
+                let (s, c) = turn[i * h % cycle];
+                re += x * c;
+                im -= x * s;
+            }
+            re /= cycle as f64;
+            im /= cycle as f64;
+            let power = re * re + im * im;
+            let weight = 1.0 - floor / power.max(1e-300);
+            if weight <= 0.0 {
+                continue;
+            }
+            if power > 12.0 * floor {
+                band = band.max(h as f64 / period);
+            }
+            let (a, b) = (2.0 * weight * re, -2.0 * weight * im); // a cos + b sin
+            let w = h as f64 * omega;
+            for i in 0..cycle {
+                let (s, c) = turn[i * h % cycle];
+                one[0][i] += a * c + b * s;
+                one[1][i] += w * (b * c - a * s);
+                one[2][i] -= w * w * (a * c + b * s);
+            }
+        }
+        for (to, from) in [&mut out.q, &mut out.qd, &mut out.qdd]
+            .into_iter()
+            .zip(&one)
+        {
+            for p in 0..periods {
+                to[j * count + p * cycle..][..cycle].copy_from_slice(from);
+            }
+        }
+    }
+    let noise = variance
+        .iter()
+        .zip(steps)
+        .map(|(v, s)| v.max(*s).sqrt())
+        .collect();
+    (out, noise, band)
+}
+
+/// A signal limited to the band of the positions: the mean period up to [`BAND`] where the motion
+/// repeats, low-passed as they are otherwise.
+pub fn limited(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
+    let cycles = cycle.map(|c| (c, c * (x.len() / c - 1)));
+    differentiated(x, &[0.0], x.len(), cycles, dt).0.q
+}
+
+/// Positions limited to a band, with their derivatives, noise and band: by Fourier series where the
+/// motion repeats (`cycles`: samples of a period, and freedoms of the scatter between periods), by a
+/// low-pass otherwise.
+pub fn differentiated(
+    q: &[f64],
+    steps: &[f64],
+    count: usize,
+    cycles: Option<(usize, usize)>,
+    dt: f64,
+) -> (Samples, Vec<f64>, f64) {
+    match cycles {
+        Some(cycles) => periodic(q, steps, count, cycles, dt),
+        None => smooth(q, steps, count, dt),
+    }
+}
+
+/// Half-width, samples, of the triangle that positions pass twice: about 12 Hz.
+pub fn half_width(dt: f64) -> usize {
+    ((0.022 / dt).round() as usize).max(1)
+}
+
+/// Low-passed positions and their central differences.
+fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> (Samples, Vec<f64>, f64) {
+    let n = steps.len();
+    let mut out = Samples::zeros(n, count);
+    let mut noise = Vec::new();
+    let half = half_width(dt);
+    for j in 0..n {
+        let row = &q[j * count..(j + 1) * count];
+        // moving averages shrink curvature; doing it twice and adding the difference back undoes
+        // the leading term (Kaiser & Hamming 1977)
+        let sharpen = |x: &[f64]| -> Vec<f64> {
+            let once = triangle(x, half);
+            let twice = triangle(&once, half);
+            once.iter().zip(&twice).map(|(a, b)| 2.0 * a - b).collect()
+        };
+        let clean = sharpen(&sharpen(row));
+        let velocity = difference(&clean, dt);
+        let acceleration = difference(&velocity, dt);
+        let rough: f64 = row
+            .windows(4)
+            .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))
+            .sum::<f64>()
+            / (20.0 * row.len() as f64);
+        noise.push(rough.max(steps[j]).sqrt());
+        out.q[j * count..(j + 1) * count].copy_from_slice(&clean);
+        out.qd[j * count..(j + 1) * count].copy_from_slice(&velocity);
+        out.qdd[j * count..(j + 1) * count].copy_from_slice(&acceleration);
+    }
+    (out, noise, 12.0)
+}
+
+fn difference(x: &[f64], dt: f64) -> Vec<f64> {
+    let last = x.len() - 1;
+    (0..=last)
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+            (x[b] - x[a]) / ((b - a) as f64 * dt)
+        })
+        .collect()
+}
+
+/// Triangular moving average of half-width `w` samples.
+pub fn triangle(x: &[f64], w: usize) -> Vec<f64> {
+    let n = x.len() as isize;
+    let w = w as isize;
+    (0..n)
+        .map(|i| {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for k in 1 - w..w {
+                if (0..n).contains(&(i + k)) {
+                    let f = (w - k.abs()) as f64;
+                    sum += f * x[(i + k) as usize];
+                    weight += f;
+                }
+            }
+            sum / weight
+        })
+        .collect()
+}
