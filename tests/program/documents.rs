@@ -203,17 +203,29 @@ fn keys_of_a_serial_robots_files_are_documented() {
         "## Simulated logs: `excite simulate`",
         &[at.join("m_monte_carlo.json")],
     );
-    let names: Vec<String> = section(&document("formats.md"), "### Names of effects")
-        .split('`')
-        .skip(1)
-        .step_by(2)
-        .map(String::from)
-        .collect();
+    let text = document("formats.md");
+    let table = section(&text, "### Names of effects");
+    let names = documented(table);
     let catalogue: Vec<String> = excite::diagnose::catalogue::all()
         .iter()
         .map(|e| e.card().name.to_string())
         .collect();
     assert_eq!(names, catalogue, "names of effects in docs/formats.md");
+    // parameters that an effect reports are named in its file
+    for line in table.lines().filter(|l| l.starts_with("| `")) {
+        let words: Vec<&str> = line.split('`').skip(1).step_by(2).collect();
+        let mut code = String::new();
+        source(&root().join("src/robot"), &mut code);
+        let file = format!("src/diagnose/catalogue/{}.rs", words[0]);
+        code += &std::fs::read_to_string(root().join(file)).expect("an effect has a file");
+        for parameter in &words[1..] {
+            assert!(
+                code.contains(&format!("\"{parameter}\"")),
+                "{}: no parameter {parameter}",
+                words[0]
+            );
+        }
+    }
 }
 
 #[test]
