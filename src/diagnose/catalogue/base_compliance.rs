@@ -107,6 +107,7 @@ fn on_joints(robot: &crate::Robot) -> crate::Robot {
         tilt.inertia = crate::robot::Inertia([0.0; 10]);
         tilt.coordinate = 1 - k;
         (tilt.ratio, tilt.offset) = (1.0, 0.0);
+        tilt.meant = None;
         out.bodies.insert(k, tilt);
         out.joints.insert(0, joint.clone());
     }
