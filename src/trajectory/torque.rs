@@ -95,7 +95,7 @@ pub fn torque_certificate(
         });
     }
     // the sup of what intervals already closed could hold
-    let mut closed = vec![0.0f64; n];
+    let mut settled = vec![0.0f64; n];
     loop {
         let best: Vec<f64> = (0..n)
             .map(|j| {
@@ -141,7 +141,7 @@ pub fn torque_certificate(
             .count();
         let halved = wanted.min(samples.saturating_sub(tau.len() / n));
         for (_, interval) in &ranked[halved..] {
-            for (j, sup) in closed.iter_mut().enumerate() {
+            for (j, sup) in settled.iter_mut().enumerate() {
                 *sup = sup.max(above(interval, j));
             }
         }
@@ -184,7 +184,7 @@ pub fn torque_certificate(
                 joint: joint.name.clone(),
                 max_on_grid: highest[j],
                 time: when[j],
-                between_grid_bound: (closed[j] - highest[j]).max(0.0),
+                between_grid_bound: (settled[j] - highest[j]).max(0.0),
                 coulomb,
                 samples: taken,
                 limit,

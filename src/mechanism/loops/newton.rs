@@ -105,7 +105,7 @@ impl LoopGeometry {
     }
 
     /// Decomposes the closures of a configuration.
-    fn closed(&self, q: Vec<f64>) -> Result<Configuration, String> {
+    fn configuration(&self, q: Vec<f64>) -> Result<Configuration, String> {
         let j = self.chain.jacobian(&q);
         let (n, m) = (q.len(), self.independent.len());
         let solver = LeastSquares::new(j.select_columns(&self.passive));
@@ -147,7 +147,7 @@ impl LoopGeometry {
     fn walk(&self, from: &Configuration, x: &[f64]) -> Result<Configuration, String> {
         let start: Vec<f64> = self.independent.iter().map(|&i| from.q[i]).collect();
         let way = DVector::from_fn(x.len(), |k, _| x[k] - start[k]);
-        let mut here = self.closed(from.q.clone())?;
+        let mut here = self.configuration(from.q.clone())?;
         let (mut done, mut piece) = (0.0, 1.0f64);
         loop {
             let step = piece.min(1.0 - done);
@@ -158,8 +158,8 @@ impl LoopGeometry {
                 false => Err(String::new()),
             };
             match next {
-                Ok(closed) => {
-                    here = closed;
+                Ok(there) => {
+                    here = there;
                     done += step;
                     if done > 1.0 - 1e-12 {
                         break;
@@ -206,7 +206,7 @@ impl LoopGeometry {
         let expected = self.chain.scaled_step(predicted.as_slice());
         let mut corrected = 0.0;
         for _ in 0..12 {
-            let at = self.closed(q)?;
+            let at = self.configuration(q)?;
             let r = self.chain.residual_of(&at.q);
             let step = self.passive_part(&at, r.as_slice());
             let size = self.chain.scaled_step(&step);
@@ -224,14 +224,14 @@ impl LoopGeometry {
                 if open > self.tolerance {
                     return Err(format!("loop {which} stays open by {open:.2e} m"));
                 }
-                return self.closed(q);
+                return self.configuration(q);
             }
         }
         Err("Newton does not converge in 12 steps".into())
     }
 
     fn at_home(&self) -> Result<Configuration, String> {
-        self.closed(self.home.clone())
+        self.configuration(self.home.clone())
     }
 
     /// Calls `f` with the closed configuration of each sample, or with `None`.
