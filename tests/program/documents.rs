@@ -14,16 +14,17 @@ fn document(name: &str) -> String {
     std::fs::read_to_string(root().join("docs").join(name)).expect("the document is there")
 }
 
-/// The text under a heading, up to the next one of the same level.
+/// The text under a heading, up to the next one of the same level or above.
 fn section<'a>(text: &'a str, heading: &str) -> &'a str {
     let start = text
         .find(&format!("\n{heading}\n"))
         .unwrap_or_else(|| panic!("no heading `{heading}`"));
     let body = &text[start + heading.len() + 2..];
-    let level = heading.split(' ').next().expect("a heading has a level");
-    body.split(&format!("\n{level} "))
-        .next()
-        .expect("split gives at least one piece")
+    let level = heading.split(' ').next().map_or(0, str::len);
+    let end = (1..=level)
+        .filter_map(|l| body.find(&format!("\n{} ", "#".repeat(l))))
+        .min();
+    &body[..end.unwrap_or(body.len())]
 }
 
 /// `a.{b,c}[].d` as `a.b[].d` and `a.c[].d`.
