@@ -8,8 +8,9 @@
 //! `(1 − G G⁺) τ_a`. The model that is written has no such term, and the residuals that are reported
 //! contain it.
 
+use super::followers::followers;
 use super::stack::Stack;
-use super::validation::{Trace, followers};
+use super::trace::Trace;
 use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::signals::Prepared;
@@ -33,15 +34,8 @@ pub fn apart(
     let names: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
     let mut traces = Vec::new();
     for (s, p) in fit.iter().zip(prepared) {
-        traces.push(Trace {
-            name: s.name.clone(),
-            purpose: s.purpose,
-            time: s.time.clone(),
-            rate: s.rate,
-            measured: s.measured.clone(),
-            predicted: s.predicted(pi),
-            velocity: plant.actuator_motion(&p.output_motion())?.qd,
-        });
+        let velocity = plant.actuator_motion(&p.output_motion())?.qd;
+        traces.push(Trace::new(s, pi, velocity));
     }
     let large = |a: usize| {
         let (mut e, mut t) = (0.0, 0.0);
@@ -89,7 +83,8 @@ pub fn apart(
     let notes = found
         .iter()
         .map(|f| {
-            Warning::new(WarningKind::JointsCoupled,
+            Warning::new(
+                WarningKind::JointsCoupled,
                 &names[f.actuator],
                 format!(
                     "{:.0} % of what the model left of its torque goes with {}: the joints seem to be coupled. That \

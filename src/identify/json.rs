@@ -1,7 +1,7 @@
 //! `report.json` and `model.json`.
 
 use super::{Identification, Settings};
-use crate::plant::{Kind, Plant};
+use crate::plant::{Column, Plant};
 use serde_json::{Value, json};
 
 /// A number, or null where it is none (JSON knows neither infinity nor NaN).
@@ -35,7 +35,7 @@ fn parameters(plant: &Plant, id: &Identification) -> Vec<Value> {
     }
     for kind in ["standard", "joint"] {
         for (u, p) in plant.parameters().iter().enumerate() {
-            if (kind == "joint") != matches!(p.kind, Kind::Term { .. }) {
+            if (kind == "joint") != matches!(p.kind, Column::Term { .. }) {
                 continue;
             }
             out.push(json!({

@@ -252,3 +252,8 @@ pub fn inverse_information(r: MatRef<'_, f64>) -> Result<Mat<f64>> {
             / (scale[i] * scale[j])
     }))
 }
+
+/// Roots of the diagonal of a covariance: standard deviations.
+pub fn deviations(c: &Mat<f64>) -> Vec<f64> {
+    (0..c.nrows()).map(|a| c[(a, a)].max(0.0).sqrt()).collect()
+}

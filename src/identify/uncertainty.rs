@@ -12,9 +12,10 @@
 //! West (1987) with the lag window replaced by its spectral counterpart and the residual taken as
 //! stationary, which halves its small-sample bias; for white residuals of unit variance `M = A`.
 
-use super::linear::{Weights, inverse_information, weighted};
+use super::linear::{self, Weights, inverse_information, weighted};
 use super::stack::Stack;
 use crate::error::Result;
+use crate::plant::Plant;
 use crate::signals::fourier::{Complex, transform};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -135,4 +136,25 @@ pub fn covariance(
     let inflation = freedom * (0..b).map(|i| half[(i, i)]).sum::<f64>() / b.max(1) as f64;
     let matrix = &half * &inverse * faer::Scale(freedom);
     Ok(Covariance { matrix, inflation })
+}
+
+/// Standard deviations that the stated torque noise promises: white, every recorded sample counted.
+///
+/// # Errors
+/// Numbers that are not finite.
+pub fn predicted(plant: &Plant, fit: &[&Stack]) -> Result<Vec<f64>> {
+    let (sigma, _) = plant.torque_noise();
+    let parts: Vec<Mat<f64>> = fit
+        .par_iter()
+        .map(|s| {
+            let root = s.stands_for.sqrt();
+            let n = s.count;
+            let rows = Mat::from_fn(s.w.nrows(), s.w.ncols(), |i, j| {
+                s.w[(i, j)] * root / sigma[i / n]
+            });
+            linear::factor(&[rows])
+        })
+        .collect();
+    let inverse = inverse_information(linear::factor(&parts).as_ref())?;
+    Ok(linear::deviations(&inverse))
 }

@@ -1,11 +1,11 @@
 //! Measured against predicted torque, record by record.
 
-use super::Settings;
+use super::equations::Equations;
+use super::followers::{Follower, followers};
 use super::stack::Stack;
-use crate::base::BaseParameters;
-use crate::error::{Result, Warning, WarningKind};
-use crate::log::{Purpose, Record};
-use crate::plant::Plant;
+use super::trace::Trace;
+use crate::error::Result;
+use crate::log::Purpose;
 use crate::signals::{self, Prepared};
 
 /// Residual of one joint.
@@ -28,25 +28,6 @@ pub struct Errors {
     pub joints: Vec<JointError>,
 }
 
-/// Residuals of one record, for figures: actuator-major over the filtered samples.
-#[derive(Debug, Clone)]
-pub struct Trace {
-    /// name of the record
-    pub name: String,
-    /// what it is for
-    pub purpose: Purpose,
-    /// s
-    pub time: Vec<f64>,
-    /// Hz
-    pub rate: f64,
-    /// measured torque, filtered
-    pub measured: Vec<f64>,
-    /// predicted torque of the consistent model
-    pub predicted: Vec<f64>,
-    /// velocities of the actuators
-    pub velocity: Vec<f64>,
-}
-
 /// All of it.
 #[derive(Debug, Clone)]
 pub struct Validation {
@@ -66,114 +47,23 @@ pub struct Validation {
     pub traces: Vec<Trace>,
 }
 
-/// A residual that is proportional, in part, to a function of another joint's velocity.
-#[derive(Debug, Clone, serde::Serialize)]
-pub struct Follower {
-    /// actuator whose residual it is
-    pub actuator: usize,
-    /// actuator that it goes with
-    pub other: usize,
-    /// function, in words
-    pub what: String,
-    /// share of the residual's power on the fit records
-    pub share: f64,
-}
-
-/// A function of the velocities of a joint and of another.
-type Function = fn(f64, f64) -> f64;
-
-/// Looks, joint by joint, for the function of another joint's velocity that explains most of the
-/// residual, beyond what functions of its own velocity do. The shares below a tenth are left out.
-pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
-    let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
-    let mut out = Vec::new();
-    for a in 0..names.len() {
-        let mut best: Option<Follower> = None;
-        for b in (0..names.len()).filter(|b| *b != a) {
-            let functions: [(String, Function); 4] = [
-                (format!("the velocity of {}", names[b]), |_, y| y),
-                (format!("the direction of {}", names[b]), |_, y| {
-                    if y == 0.0 { 0.0 } else { y.signum() }
-                }),
-                (
-                    format!("the direction of {} + {}", names[a], names[b]),
-                    |x, y| (x + y).signum(),
-                ),
-                (
-                    format!("the direction of {} − {}", names[a], names[b]),
-                    |x, y| (x - y).signum(),
-                ),
-            ];
-            for (what, f) in functions {
-                // f and residual, both without their own velocity, direction and mean
-                let (mut g, mut e, mut own) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
-                for t in traces.iter().filter(|t| t.purpose == Purpose::Fit) {
-                    let n = t.time.len();
-                    for k in 0..n {
-                        let (x, y) = (t.velocity[a * n + k], t.velocity[b * n + k]);
-                        g.push(f(x, y));
-                        e.push(t.measured[a * n + k] - t.predicted[a * n + k]);
-                        own[0].push(x);
-                        own[1].push(sign(x));
-                    }
-                }
-                let [x, s] = own;
-                let power: f64 = e.iter().map(|v| v * v).sum();
-                let mut list = [vec![1.0; e.len()], x, s, g];
-                // Gram-Schmidt; what is left of the last explains what is left of the residual
-                for i in 0..4 {
-                    let (before, rest) = list.split_at_mut(i);
-                    for q in before.iter() {
-                        let c: f64 = q.iter().zip(&rest[0]).map(|(p, r)| p * r).sum();
-                        rest[0].iter_mut().zip(q).for_each(|(r, p)| *r -= c * p);
-                    }
-                    let norm = rest[0].iter().map(|v| v * v).sum::<f64>().sqrt();
-                    let small = norm <= 1e-6 * (e.len() as f64).sqrt();
-                    rest[0]
-                        .iter_mut()
-                        .for_each(|r| *r = if small { 0.0 } else { *r / norm });
-                }
-                let c: f64 = list[3].iter().zip(&e).map(|(p, r)| p * r).sum();
-                let share = c * c / power.max(1e-300);
-                if share > 0.1 && best.as_ref().is_none_or(|f| share > f.share) {
-                    best = Some(Follower {
-                        actuator: a,
-                        other: b,
-                        what,
-                        share,
-                    });
-                }
-            }
-        }
-        out.extend(best);
-    }
-    out
-}
-
-/// Predicts every record as recorded (periods are not averaged) and compares.
+/// Predicts every record as recorded (periods are not averaged) and compares. `models` are base parameters:
+/// of the method alone, of the consistent model, of the essential parameters.
 ///
 /// # Errors
 /// A pose of a parallel robot that cannot be reached.
-#[allow(clippy::too_many_arguments)]
-pub fn validate(
-    plant: &Plant,
-    base: &BaseParameters,
-    records: &[&Record],
-    stacks: &[Stack],
-    prepared: &[Prepared],
-    settings: &Settings,
-    pi: &[f64],
-    consistent: &[f64],
-    essential: &[f64],
-) -> Result<Validation> {
+pub fn validate(equations: &Equations, models: [&[f64]; 3]) -> Result<Validation> {
+    let Equations { plant, base, .. } = *equations;
+    let [pi, consistent, essential] = models;
     let names: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
     let nominal = base.project(&plant.values());
+    let pairs = equations.stacks.iter().zip(&equations.prepared);
     let mut recorded = Vec::new();
-    for ((r, s), q) in records.iter().zip(stacks).zip(prepared) {
-        let again = settings.signals.average && signals::averaged(r).is_some();
+    for (r, (s, q)) in equations.records.iter().zip(pairs) {
+        let again = equations.signals.average && signals::averaged(r).is_some();
         let whole = signals::Settings {
             average: false,
-            ..settings.signals.clone()
+            ..equations.signals.clone()
         };
         let p = match again {
             true => Prepared::new(r, plant, &whole)?,
@@ -234,15 +124,7 @@ pub fn validate(
     };
     let traces: Vec<Trace> = recorded
         .iter()
-        .map(|(s, velocity)| Trace {
-            name: s.name.clone(),
-            purpose: s.purpose,
-            time: s.time.clone(),
-            rate: s.rate,
-            measured: s.measured.clone(),
-            predicted: s.predicted(consistent),
-            velocity: velocity.clone(),
-        })
+        .map(|(s, velocity)| Trace::new(s, consistent, velocity.clone()))
         .collect();
     Ok(Validation {
         fit: errors(Purpose::Fit, consistent).unwrap_or_else(empty),
@@ -253,46 +135,4 @@ pub fn validate(
         followers: followers(&names, &traces),
         traces,
     })
-}
-
-/// Torques that look as if they were in another unit: compared with the nominal model.
-pub fn unit_suspicions(plant: &Plant, base: &BaseParameters, fit: &[&Stack]) -> Vec<Warning> {
-    let pi = base.project(&plant.values());
-    let mut out = Vec::new();
-    for (a, joint) in plant.actuators().iter().enumerate() {
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-        for s in fit {
-            let predicted = s.predicted(&pi);
-            let range = a * s.count..(a + 1) * s.count;
-            for k in range {
-                let (x, y) = (predicted[k], s.measured[k]);
-                xx += x * x;
-                xy += x * y;
-                yy += y * y;
-            }
-        }
-        if xx == 0.0 || yy == 0.0 {
-            continue;
-        }
-        let (slope, alike) = (xy / xx, xy / (xx * yy).sqrt());
-        let close = |x: f64, y: f64| (x / y - 1.0).abs() < 0.4;
-        let gear = joint.gear_ratio.filter(|g| g.abs() > 3.0);
-        let message = match gear {
-            Some(g) if alike.abs() > 0.7 && close(slope.abs(), 1.0 / g.abs()) => format!(
-                "its torque is {slope:.4} times the model's, which is the inverse of the gear ratio {g}: is it \
-                 that of the motor?"
-            ),
-            _ if alike < -0.8 => {
-                "its torque is the opposite of the model's: is its sign, or that of the \
-                                  position, turned round?"
-                    .into()
-            }
-            _ if alike > 0.8 && !(0.15..7.0).contains(&slope) => format!(
-                "its torque is {slope:.3} times the model's: is it a current, a motor torque, or in other units?"
-            ),
-            _ => continue,
-        };
-        out.push(Warning::new(WarningKind::UnitSuspect, &joint.name, message));
-    }
-    out
 }

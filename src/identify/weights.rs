@@ -54,11 +54,6 @@ pub fn floored(mut c: Mat<f64>, stacks: &[&Stack]) -> Mat<f64> {
     c
 }
 
-/// Standard deviation of each actuator's residual alone.
-pub fn deviations(c: &Mat<f64>) -> Vec<f64> {
-    (0..c.nrows()).map(|a| c[(a, a)].max(0.0).sqrt()).collect()
-}
-
 /// Tukey's constant for 95 % efficiency with one channel; it grows with the root of the number of
 /// channels that the distance is taken over.
 const TUKEY: f64 = 4.685;

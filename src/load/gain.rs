@@ -12,9 +12,9 @@
 //! that the small difference that the load makes is not attenuated, which least squares in
 //! `τ_j / k_j` would do.
 
-use super::Loaded;
 use super::body::from_quantities;
-use super::system::System;
+use super::records::Loaded;
+use super::system::{Part, System};
 use super::weight::inflation;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Payload;
@@ -58,6 +58,15 @@ impl Gains {
     }
 }
 
+/// Rounds of Gauss-Newton at most, and those before it may end.
+const ROUNDS: [usize; 2] = [25, 2];
+/// Change of the gains at which it ends.
+const SETTLED: f64 = 1e-10;
+/// A gain is corrected where it differs from 1 by more than this many of its standard deviations …
+const CERTAIN: f64 = 3.0;
+/// … and where its standard deviation is below this.
+const USEFUL: f64 = 0.2;
+
 /// Estimates the gains from the records with a known load and those without a load.
 ///
 /// # Errors
@@ -75,127 +84,146 @@ pub fn estimate(plant: &Plant, tool: usize, records: &[Loaded]) -> Result<Gains>
         ));
     }
     let system = System::new(plant, tool, &used, true)?;
-    let (na, nd, np) = (
-        system.actuators,
-        system.deviations.len(),
-        system.parts.len(),
-    );
-    // torque of the known load, part by part
-    let known: Vec<Vec<f64>> = system
-        .parts
-        .iter()
-        .zip(&used)
-        .map(|(part, loaded)| {
-            let Payload::Known { mass, com, inertia } = loaded.payload else {
-                return vec![0.0; part.y.len()];
-            };
-            let mut values = [0.0; 10];
-            values[0] = mass;
-            values[1..4].copy_from_slice(&com);
-            values[4..].copy_from_slice(&inertia.unwrap_or_default());
-            let phi = from_quantities(&values).0;
-            (0..part.y.len())
-                .map(|i| (0..10).map(|k| part.tool[(i, k)] * phi[k]).sum())
-                .collect()
-        })
-        .collect();
-    let n = na + nd + 3 * na * np;
-    let mut gain = vec![1.0; na];
-    let mut sigma = vec![1.0; na];
-    let mut covariance = Mat::<f64>::zeros(n, n);
-    let mut x = vec![0.0; n];
-    for round in 0..25 {
-        let rows: usize = system.parts.iter().map(|p| p.y.len()).sum();
-        let mut a = Mat::<f64>::zeros(rows + n, n);
-        let mut y = Mat::<f64>::zeros(rows + n, 1);
-        let mut model = Vec::with_capacity(rows);
-        let mut r = 0;
-        for (p, part) in system.parts.iter().enumerate() {
-            for i in 0..part.y.len() {
-                let j = i / part.count;
-                let w = 1.0 / sigma[j];
-                // torque without gain: rigid model, deviations, known load, friction
-                let mut inner = part.torque[i] - part.y[i] + known[p][i];
-                for c in 0..nd {
-                    inner += x[na + c] * part.deviation[(i, c)];
-                    a[(r, na + c)] = w * gain[j] * part.deviation[(i, c)];
-                }
-                let first = na + nd + 3 * (p * na + j);
-                for f in 0..3 {
-                    inner += x[first + f] * part.friction[f][i];
-                    a[(r, first + f)] = w * gain[j] * part.friction[f][i];
-                }
-                a[(r, j)] = w * inner;
-                y[(r, 0)] = w * (part.torque[i] - gain[j] * inner);
-                model.push(inner);
-                r += 1;
-            }
-        }
-        for c in 0..n {
-            let norm = a.col(c).norm_l2();
-            a[(rows + c, c)] = 1e-9 * if norm > 0.0 { norm } else { 1.0 };
-        }
+    let known = system.parts.iter().zip(&used);
+    let known = known.map(|(part, loaded)| known_torque(part, loaded));
+    let (gain, std) = gauss_newton(&system, &known.collect::<Vec<_>>())?;
+    Ok(judged(plant, gain, std))
+}
+
+/// Torque of the known load of a record.
+fn known_torque(part: &Part, loaded: &Loaded) -> Vec<f64> {
+    let Payload::Known { mass, com, inertia } = loaded.payload else {
+        return vec![0.0; part.y.len()];
+    };
+    let mut values = [0.0; 10];
+    values[0] = mass;
+    values[1..4].copy_from_slice(&com);
+    values[4..].copy_from_slice(&inertia.unwrap_or_default());
+    let phi = from_quantities(&values).0;
+    (0..part.y.len())
+        .map(|i| (0..10).map(|k| part.tool[(i, k)] * phi[k]).sum())
+        .collect()
+}
+
+/// Gains, deviations and friction, and the noise of each joint.
+struct State {
+    gain: Vec<f64>,
+    /// deviations, then Coulomb, viscous and constant friction of every joint in every record
+    rest: Vec<f64>,
+    sigma: Vec<f64>,
+}
+
+/// Gains and their standard deviations, by Gauss-Newton with the noise of each joint from what is left.
+fn gauss_newton(system: &System, known: &[Vec<f64>]) -> Result<(Vec<f64>, Vec<f64>)> {
+    let na = system.actuators;
+    let others = system.deviations.len() + 3 * na * system.parts.len();
+    let mut state = State {
+        gain: vec![1.0; na],
+        rest: vec![0.0; others],
+        sigma: vec![1.0; na],
+    };
+    let [most, least] = ROUNDS;
+    for round in 0..most {
+        let (a, y, model) = linearised(system, known, &state);
         let qr = a.qr();
         let step = qr.solve_lstsq(&y);
         let mut change = 0.0f64;
-        for j in 0..na {
-            gain[j] += step[(j, 0)];
+        for (j, gain) in state.gain.iter_mut().enumerate() {
+            *gain += step[(j, 0)];
             change = change.max(step[(j, 0)].abs());
         }
-        for c in na..n {
-            x[c] += step[(c, 0)];
+        for (c, x) in state.rest.iter_mut().enumerate() {
+            *x += step[(na + c, 0)];
         }
-        if gain.iter().any(|g| !g.is_finite()) {
+        if state.gain.iter().any(|g| !g.is_finite()) {
             return Err(Error::Infeasible(
                 "the drive gains have no finite solution; the known load may be too small to be \
                  felt"
                     .into(),
             ));
         }
-        // noise of each joint from what is left
-        let mut r = 0;
-        let mut square = vec![0.0; na];
-        let mut count = vec![0usize; na];
-        let mut rest: Vec<Vec<f64>> = vec![Vec::new(); na];
-        for part in &system.parts {
-            for i in 0..part.y.len() {
-                let j = i / part.count;
-                let e = part.torque[i] - gain[j] * model[r];
-                square[j] += e * e;
-                count[j] += 1;
-                rest[j].push(e);
-                r += 1;
-            }
-        }
-        let worth: Vec<f64> = rest.iter().map(|e| inflation(e)).collect();
-        if round > 2 && change < 1e-10 {
+        let left = residuals(system, &state.gain, &model);
+        if round > least && change < SETTLED {
             let thin = qr.thin_R();
-            let information = thin.transpose() * thin;
-            covariance = information.partial_piv_lu().inverse();
-            for j in 0..na {
-                covariance[(j, j)] *= worth[j];
-            }
-            break;
+            let covariance = (thin.transpose() * thin).partial_piv_lu().inverse();
+            let std = |j: usize| (covariance[(j, j)] * inflation(&left[j])).max(0.0).sqrt();
+            return Ok((state.gain, (0..na).map(std).collect()));
         }
-        for j in 0..na {
-            sigma[j] = (square[j] / count[j].max(1) as f64).sqrt().max(1e-12);
-        }
-        if round == 24 {
-            return Err(Error::Infeasible(
-                "the drive gains do not converge: the known load is too small to be felt on every \
-                 drive"
-                    .into(),
-            ));
+        for (sigma, e) in state.sigma.iter_mut().zip(&left) {
+            let square = e.iter().fold(0.0, |s, e| s + e * e);
+            *sigma = (square / e.len().max(1) as f64).sqrt().max(1e-12);
         }
     }
+    Err(Error::Infeasible(
+        "the drive gains do not converge: the known load is too small to be felt on every \
+         drive"
+            .into(),
+    ))
+}
+
+/// Weighted rows about a state, right-hand side, and the torques without gain.
+fn linearised(
+    system: &System,
+    known: &[Vec<f64>],
+    state: &State,
+) -> (Mat<f64>, Mat<f64>, Vec<f64>) {
+    let (na, nd) = (system.actuators, system.deviations.len());
+    let n = na + state.rest.len();
+    let rows: usize = system.parts.iter().map(|p| p.y.len()).sum();
+    let mut a = Mat::<f64>::zeros(rows + n, n);
+    let mut y = Mat::<f64>::zeros(rows + n, 1);
+    let mut model = Vec::with_capacity(rows);
+    let mut r = 0;
+    for (p, part) in system.parts.iter().enumerate() {
+        for i in 0..part.y.len() {
+            let j = i / part.count;
+            let w = 1.0 / state.sigma[j];
+            // torque without gain: rigid model, deviations, known load, friction
+            let mut inner = part.torque[i] - part.y[i] + known[p][i];
+            for c in 0..nd {
+                inner += state.rest[c] * part.deviation[(i, c)];
+                a[(r, na + c)] = w * state.gain[j] * part.deviation[(i, c)];
+            }
+            let first = nd + 3 * (p * na + j);
+            for f in 0..3 {
+                inner += state.rest[first + f] * part.friction[f][i];
+                a[(r, na + first + f)] = w * state.gain[j] * part.friction[f][i];
+            }
+            a[(r, j)] = w * inner;
+            y[(r, 0)] = w * (part.torque[i] - state.gain[j] * inner);
+            model.push(inner);
+            r += 1;
+        }
+    }
+    for c in 0..n {
+        let norm = a.col(c).norm_l2();
+        a[(rows + c, c)] = 1e-9 * if norm > 0.0 { norm } else { 1.0 };
+    }
+    (a, y, model)
+}
+
+/// What is left of the measured torques, joint by joint; `model` are the torques without gain.
+fn residuals(system: &System, gain: &[f64], model: &[f64]) -> Vec<Vec<f64>> {
+    let mut out: Vec<Vec<f64>> = vec![Vec::new(); system.actuators];
+    let mut model = model.iter();
+    for part in &system.parts {
+        for (i, torque) in part.torque.iter().enumerate() {
+            let j = i / part.count;
+            let inner = model.next().copied().unwrap_or(0.0);
+            out[j].push(torque - gain[j] * inner);
+        }
+    }
+    out
+}
+
+/// Which gains are certain enough to correct the torques with.
+fn judged(plant: &Plant, value: Vec<f64>, std: Vec<f64>) -> Gains {
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
-    let std: Vec<f64> = (0..na)
-        .map(|j| covariance[(j, j)].max(0.0).sqrt())
+    let pairs = value.iter().zip(&std);
+    let corrected: Vec<bool> = pairs
+        .map(|(k, s)| (k - 1.0).abs() > CERTAIN * s && *s < USEFUL)
         .collect();
-    let corrected: Vec<bool> = (0..na)
-        .map(|j| (gain[j] - 1.0).abs() > 3.0 * std[j] && std[j] < 0.2)
-        .collect();
-    let warnings = (0..na)
+    let warnings = (0..joints.len())
         .filter(|&j| corrected[j])
         .map(|j| {
             Warning::new(
@@ -204,16 +232,16 @@ pub fn estimate(plant: &Plant, tool: usize, records: &[Loaded]) -> Result<Gains>
                 format!(
                     "measured torques are {:.3} ± {:.3} times what the known load tells; they were \
                      divided by it",
-                    gain[j], std[j]
+                    value[j], std[j]
                 ),
             )
         })
         .collect();
-    Ok(Gains {
+    Gains {
         joints,
-        value: gain,
+        value,
         std,
         corrected,
         warnings,
-    })
+    }
 }

@@ -1,7 +1,7 @@
 //! The linear system of all records: torques that the nominal model does not explain, and the
 //! columns that may.
 
-use super::Loaded;
+use super::records::Loaded;
 use crate::base::BaseParameters;
 use crate::dynamics::Samples;
 use crate::error::Result;

@@ -24,8 +24,9 @@
 
 use super::body::{LoadBody, Quantities, difference, from_quantities};
 use super::one_step::{Solver, rms};
+use super::records::Loaded;
+use super::settings::Settings;
 use super::system::System;
-use super::{Loaded, Settings};
 use crate::dynamics::{Samples, Workspace};
 use crate::error::{Error, Result};
 use crate::log::Payload;

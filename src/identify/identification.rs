@@ -1,0 +1,54 @@
+//! The result of [`identify`](super::identify).
+
+use super::cross_validation::Trial;
+use super::essential::Essential;
+use super::validation::Validation;
+use crate::base::BaseParameters;
+use crate::error::Warning;
+use crate::signals::Prepared;
+use faer::Mat;
+
+/// What identification came to.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// base parameters of the plant
+    pub base: BaseParameters,
+    /// estimate of the base parameters by the method alone
+    pub pi: Vec<f64>,
+    /// standard deviations of it, correlation in time included
+    pub std: Vec<f64>,
+    /// the whole covariance
+    pub covariance: Mat<f64>,
+    /// standard deviations that the robot file's torque noise promises, white
+    pub predicted_std: Vec<f64>,
+    /// variance through correlation in time, relative to white residuals
+    pub inflation: f64,
+    /// standard parameters, physically consistent unless asked otherwise
+    pub phi: Vec<f64>,
+    /// base parameters of `phi`
+    pub pi_consistent: Vec<f64>,
+    /// standard deviations of `phi`: data and prior
+    pub phi_std: Vec<f64>,
+    /// strength of the prior that was used
+    pub prior_strength: f64,
+    /// how it was chosen
+    pub trials: Vec<Trial>,
+    /// smallest over largest eigenvalue of any pseudo-inertia, and the body
+    pub margin: Option<(f64, String)>,
+    /// whether every body can exist and no friction or armature is negative
+    pub consistent: bool,
+    /// essential parameters
+    pub essential: Essential,
+    /// condition number of the weighted equations
+    pub condition: f64,
+    /// covariance of the residual between actuators, (N m)²
+    pub residual_covariance: Mat<f64>,
+    /// share of the samples that the robust method set aside
+    pub outliers: Option<f64>,
+    /// residuals record by record, of the base estimate and of the consistent one
+    pub validation: Validation,
+    /// records as they were used, in the order of the experiment
+    pub prepared: Vec<Prepared>,
+    /// everything imperfect
+    pub warnings: Vec<Warning>,
+}

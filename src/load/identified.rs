@@ -1,0 +1,41 @@
+//! The result of [`identify`](super::identify).
+
+use super::body::LoadBody;
+use super::gain::Gains;
+use super::one_step::OneStep;
+use super::settings::Method;
+use super::two_step::TwoStep;
+use crate::error::Warning;
+
+/// Everything that is known of the load afterwards.
+#[derive(Debug)]
+pub struct Identified {
+    /// robot
+    pub robot: String,
+    /// its actuators, in the order of the log columns
+    pub joints: Vec<String>,
+    /// link or platform in whose frame the load is given
+    pub frame: String,
+    /// all parameters at once
+    pub one_step: OneStep,
+    /// the published estimator, where it applies
+    pub two_step: Option<TwoStep>,
+    /// why the published estimator does not apply
+    pub no_two_step: String,
+    /// factors of the measured torques, where a known load tells them
+    pub gain: Option<Gains>,
+    /// estimate that counts
+    pub method: Method,
+    /// what was found on the way
+    pub warnings: Vec<Warning>,
+}
+
+impl Identified {
+    /// The load by the method that counts.
+    pub fn load(&self) -> &LoadBody {
+        match (self.method, &self.two_step) {
+            (Method::TwoStep, Some(two)) => &two.load,
+            _ => &self.one_step.load,
+        }
+    }
+}

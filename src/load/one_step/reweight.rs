@@ -1,0 +1,121 @@
+//! Weights from the residuals: the spread of each actuator as a function of its speed, iterated.
+
+use super::fitted::rms;
+use super::solver::{Solution, Solver};
+use super::ten::point_mass;
+use crate::error::Result;
+use crate::load::settings::{Parameters, Settings};
+use crate::load::system::{Part, System};
+use crate::load::weight::{Spread, inflation};
+use crate::plant::Plant;
+use faer::Mat;
+use faer::linalg::solvers::DenseSolveCore;
+
+/// Rounds of reweighting.
+const ROUNDS: usize = 10;
+
+/// Change of the load's parameters, relative, at which reweighting ends.
+const SETTLED: f64 = 1e-8;
+
+/// Standard deviation of each actuator's torque that the first weights take: the stated noise, or a hundredth
+/// of the torque.
+pub fn first_noise(plant: &Plant, system: &System) -> Vec<f64> {
+    plant
+        .actuators()
+        .iter()
+        .enumerate()
+        .map(|(a, joint)| {
+            joint.torque_noise.unwrap_or_else(|| {
+                let rows = |p: &Part| p.torque[a * p.count..(a + 1) * p.count].to_vec();
+                let all: Vec<f64> = system.parts.iter().flat_map(rows).collect();
+                (rms(&all) * 0.01).max(1e-12)
+            })
+        })
+        .collect()
+}
+
+/// Standard deviation of row `i` of record `p`.
+fn deviation(system: &System, spreads: &[Spread], p: usize, i: usize) -> f64 {
+    let part = &system.parts[p];
+    spreads[i / part.count].variance(part.speed[i]).sqrt()
+}
+
+/// Spread of the residual of an actuator.
+fn spread(system: &System, s: &Solution, a: usize, least: f64, weighted: bool) -> Spread {
+    let (mut r, mut v) = (Vec::new(), Vec::new());
+    for (part, rest) in system.parts.iter().zip(&s.residual) {
+        r.extend_from_slice(&rest[a * part.count..(a + 1) * part.count]);
+        v.extend_from_slice(&part.speed[a * part.count..(a + 1) * part.count]);
+    }
+    match weighted {
+        true => Spread::fit(&r, &v, least),
+        false => Spread::even(rms(&r).max(least)),
+    }
+}
+
+/// Solves with weights from the residuals of the solution before, until the load no longer changes.
+///
+/// # Errors
+/// Signals that are not finite.
+pub fn reweighted(
+    solver: &mut Solver,
+    noise: &[f64],
+    settings: &Settings,
+) -> Result<(Solution, Vec<Spread>)> {
+    let system = solver.system;
+    let load = system.deviations.len()..system.deviations.len() + solver.load.len();
+    let mut spreads: Vec<Spread> = noise.iter().map(|&n| Spread::even(n)).collect();
+    let mut solution = solver.solve(&|p, i| deviation(system, &spreads, p, i))?;
+    for _ in 0..ROUNDS {
+        let before = solution.values.clone();
+        if settings.weighted {
+            let noise: Vec<f64> = spreads.iter().map(|s| s.floor).collect();
+            solver.find_peaks(&solution, &noise);
+        }
+        if settings.parameters == Parameters::MassCom {
+            point_mass(solver, &solution.values[load.clone()]);
+        }
+        for (a, s) in spreads.iter_mut().enumerate() {
+            *s = spread(system, &solution, a, 1e-9 * noise[a], settings.weighted);
+        }
+        solution = solver.solve(&|p, i| deviation(system, &spreads, p, i))?;
+        let change = load
+            .clone()
+            .map(|c| (solution.values[c] - before[c]).abs() / solution.values[c].abs().max(1e-9))
+            .fold(0.0f64, f64::max);
+        if change < SETTLED {
+            break;
+        }
+    }
+    Ok((solution, spreads))
+}
+
+/// Covariance of all columns, counting what autocorrelated residuals are worth.
+///
+/// # Errors
+/// Signals that are not finite.
+pub fn covariance(solver: &Solver, solution: &Solution, spreads: &[Spread]) -> Result<Mat<f64>> {
+    let system = solver.system;
+    let worth: Vec<Vec<f64>> = system
+        .parts
+        .iter()
+        .zip(&solution.residual)
+        .enumerate()
+        .map(|(p, (part, rest))| {
+            (0..system.actuators)
+                .map(|a| {
+                    let whitened: Vec<f64> = (a * part.count..(a + 1) * part.count)
+                        .map(|i| rest[i] / deviation(system, spreads, p, i))
+                        .collect();
+                    inflation(&whitened)
+                })
+                .collect()
+        })
+        .collect();
+    let deflated = solver.solve(&|p, i| {
+        let a = i / system.parts[p].count;
+        deviation(system, spreads, p, i) * worth[p][a].sqrt()
+    })?;
+    let information = deflated.r.transpose() * &deflated.r;
+    Ok(information.partial_piv_lu().inverse())
+}

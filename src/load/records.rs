@@ -1,0 +1,95 @@
+//! The records: with torques from chamber pressures where they have none, and with what they carried.
+
+use super::settings::Settings;
+use crate::error::{Error, Result};
+use crate::log::{Experiment, Payload, Record};
+use crate::plant::Plant;
+use crate::signals::Prepared;
+
+/// A record with what it carried.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// signals
+    pub record: Prepared,
+    /// load
+    pub payload: Payload,
+}
+
+/// The records of an experiment with their signals prepared.
+///
+/// # Errors
+/// Signals that cannot be used; pressures of a robot without piston areas.
+pub fn prepared(experiment: &Experiment, settings: &Settings) -> Result<Vec<Loaded>> {
+    let plant = &experiment.plant;
+    let one = |record: &Record| {
+        let pressed = pressure_forces(record, plant, settings.atmosphere)?;
+        let record = pressed.as_ref().unwrap_or(record);
+        Ok(Loaded {
+            record: Prepared::new(record, plant, &settings.signals)?,
+            payload: record.payload,
+        })
+    };
+    experiment.records.iter().map(one).collect()
+}
+
+/// Refuses records without torques, and experiments without an unknown load.
+///
+/// # Errors
+/// What is missing, and how to state it.
+pub fn check(records: &[Loaded]) -> Result<()> {
+    if let Some(r) = records.iter().find(|r| r.record.torque.is_empty()) {
+        return Err(Error::Infeasible(format!(
+            "{}: the log has neither torques nor pressures with piston areas",
+            r.record.name
+        )));
+    }
+    if !any(records, Payload::Unknown) {
+        return Err(Error::Infeasible(
+            "no record has the load that is to be identified: write payload = \"unknown\" at the \
+             records of the loaded robot in the experiment (and payload = \"none\" at those of the \
+             empty one)"
+                .into(),
+        ));
+    }
+    Ok(())
+}
+
+/// Whether any record carried this.
+pub fn any(records: &[Loaded], payload: Payload) -> bool {
+    records.iter().any(|r| r.payload == payload)
+}
+
+/// The record with forces from the chamber pressures where it has no torques:
+///
+/// ```text
+/// f = p_a A_a − p_b A_b − p_atm (A_a − A_b)
+/// ```
+///
+/// # Errors
+/// A log with pressures of a robot without piston areas.
+pub fn pressure_forces(record: &Record, plant: &Plant, atmosphere: f64) -> Result<Option<Record>> {
+    let Some([pa, pb]) = record.pressures.as_ref().filter(|_| record.tau.is_empty()) else {
+        return Ok(None);
+    };
+    let tau = plant
+        .actuators()
+        .iter()
+        .zip(pa.iter().zip(pb))
+        .map(|(joint, (a, b))| {
+            let Some([area_a, area_b]) = joint.piston else {
+                return Err(Error::Infeasible(format!(
+                    "{}: the log has chamber pressures, but `{}` no piston areas; add piston = \
+                     [AREA_A, AREA_B] in m^2 to [actuator] or to its [[joint]] in the robot file",
+                    record.name, joint.name
+                )));
+            };
+            let outside = atmosphere * (area_a - area_b);
+            let force = |(a, b): (&f64, &f64)| a * area_a - b * area_b - outside;
+            Ok(a.iter().zip(b).map(force).collect())
+        })
+        .collect::<Result<Vec<Vec<f64>>>>()?;
+    Ok(Some(Record {
+        tau,
+        ..record.clone()
+    }))
+}
