@@ -21,19 +21,11 @@ use super::catalogue::{Context, Effect};
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
 use super::prior::{Closeness, factors};
+use super::thresholds::THRESHOLDS as T;
 use crate::robot::Prior;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use rayon::prelude::*;
-
-/// Factors that are tried.
-const SCALES: [f64; 7] = [1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.125];
-
-/// How far `−2 ln p` may lie above the least: the 95 % point of χ² for one freedom.
-const LIKELY: f64 = 3.84;
-/// By how much the two factors may differ: robots of few joints hardly tell first moments from tensors, and one
-/// must not be taken for exact because the other can stand for it.
-const APART: f64 = 3.0;
 
 /// Residual, model and one set of columns as the parameters see them, in units of the prior.
 struct Reduced {
@@ -92,10 +84,11 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
             .map(|p| evidence.as_seen(p).map(|m| m * (1.0 / level)))
             .collect(),
     };
-    let pairs: Vec<Closeness> = SCALES
+    let scales = T.closeness.scales;
+    let pairs: Vec<Closeness> = scales
         .iter()
-        .flat_map(|a| SCALES.iter().map(move |b| [*a, *b]))
-        .filter(|[a, b]| a.max(*b) < APART * a.min(*b))
+        .flat_map(|a| scales.iter().map(move |b| [*a, *b]))
+        .filter(|[a, b]| a.max(*b) < T.closeness.apart * a.min(*b))
         .collect();
     let costs: Vec<f64> = pairs
         .par_iter()
@@ -103,7 +96,7 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
         .collect();
     // the loosest that are nearly as likely: robots of few joints say little about it
     let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
-    let likely = (0..pairs.len()).filter(|i| costs[*i] <= least + LIKELY);
+    let likely = (0..pairs.len()).filter(|i| costs[*i] <= least + T.closeness.likely);
     let product = |i: &usize| pairs[*i][0] * pairs[*i][1];
     let loosest = likely.max_by(|a, b| product(a).total_cmp(&product(b)));
     loosest.map_or([1.0; 2], |i| pairs[i])

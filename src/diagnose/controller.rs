@@ -16,6 +16,7 @@
 
 use super::data::Data;
 use super::evidence::{Fit, solve};
+use super::thresholds::THRESHOLDS as T;
 use super::window::sign;
 use crate::dynamics::Samples;
 use crate::plant::Plant;
@@ -29,13 +30,7 @@ use std::f64::consts::TAU;
 
 /// Natural frequency of the spring that holds the robot to the recorded motion where its own controller is not
 /// known, Hz.
-pub const BANDWIDTH: f64 = 2.0;
-/// A gain must be this many of its standard deviations.
-const CERTAIN: f64 = 6.0;
-/// Most that the controller may leave of the torque (rms over rms).
-const LEFT: f64 = 0.1;
-/// The same in standard deviations of the torque noise.
-const NOISE: f64 = 3.0;
+pub const BANDWIDTH: f64 = T.controller.bandwidth;
 
 /// What a feedback acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -109,12 +104,14 @@ pub fn identify(data: &Data, phi: &[f64]) -> Result<Feedback, String> {
         // of two that are as good, as they are on a single axis, the plain one
         match f.kind {
             Kind::Actuators => left,
-            Kind::InverseDynamics => 1.02 * left,
+            Kind::InverseDynamics => T.controller.plain * left,
         }
     };
     let sound = |f: &Feedback| {
         let ok = |(j, l): (usize, &f64)| {
-            *l < LEFT || l * signals.rms(j) < NOISE * data.noise[j].std || f.soft.contains(&j)
+            *l < T.controller.left
+                || l * signals.rms(j) < T.controller.noise * data.noise[j].std
+                || f.soft.contains(&j)
         };
         f.left.iter().enumerate().all(ok)
     };
@@ -247,7 +244,7 @@ impl Signals {
                 .collect(),
             ahead: (0..n)
                 .map(|j| {
-                    let slow = 0.02 * data.speed[j];
+                    let slow = T.controller.slow * data.speed[j];
                     let sense = |k: usize| -> Vec<f64> {
                         part(&command(k).qd, j, k)
                             .into_iter()
@@ -332,13 +329,15 @@ impl Signals {
         let scale = super::verdict::inflation(&residual, rows);
         let certain = |p: usize| {
             let std = fit.covariance[p][p].max(0.0).sqrt() * scale;
-            p < parts && std > 0.0 && fit.eta[p] > CERTAIN * std
+            p < parts && std > 0.0 && fit.eta[p] > T.controller.certain * std
         };
         let sure = [certain(0), certain(1), certain(2)];
         let mut gains = [0.0; 3];
         gains[..parts].copy_from_slice(&fit.eta[..parts]);
         // a controller may have no damping of its own
-        if !sure[1] && gains[1].abs() < CERTAIN * fit.covariance[1][1].max(0.0).sqrt() * scale {
+        if !sure[1]
+            && gains[1].abs() < T.controller.certain * fit.covariance[1][1].max(0.0).sqrt() * scale
+        {
             gains[1] = gains[1].max(0.0);
         }
         let left = joints

@@ -16,15 +16,16 @@
 use super::column::Column;
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
+use super::thresholds::THRESHOLDS as T;
 
-/// Number of decoys of an effect.
-pub const COUNT: usize = 12;
+/// Fractional part of the golden ratio: multiples of it fill an interval evenly.
+const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// Shares of a record by which decoys are moved, within 0.1 to 0.4 and 0.6 to 0.9.
 fn shifts() -> impl Iterator<Item = f64> {
-    (0..COUNT).map(|d| {
-        let golden = (0.618_033_988_749_895 * (d as f64 + 1.0)).fract();
-        let near = 0.1 + 0.3 * golden;
+    (0..T.decoys.count).map(|d| {
+        let golden = (GOLDEN * (d as f64 + 1.0)).fract();
+        let near = T.decoys.nearest + T.decoys.spread * golden;
         if d % 2 == 0 { near } else { 1.0 - near }
     })
 }

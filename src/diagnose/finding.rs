@@ -3,6 +3,7 @@
 use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value};
 use super::evidence::{Evidence, Projected};
 use super::interval;
+use super::thresholds::THRESHOLDS;
 use super::verdict::Decision;
 
 /// One effect in the result.
@@ -24,7 +25,7 @@ pub struct Finding {
     pub shape: Shape,
     /// coefficients
     pub eta: Vec<f64>,
-    /// 0 to 1; a claim from 0.5 on
+    /// 0 to 1; see [`Finding::is_claim`]
     pub confidence: f64,
     /// share of the gap on fitted records
     pub explains: f64,
@@ -47,6 +48,13 @@ pub struct Finding {
     pub member: bool,
     /// whether it shows against the prior of the parameters, not in a refitted residual
     pub frozen: bool,
+}
+
+impl Finding {
+    /// Whether it is claimed: it belongs to the set, and is at least as likely there as not.
+    pub fn is_claim(&self) -> bool {
+        self.member && self.confidence >= THRESHOLDS.confidence.claim
+    }
 }
 
 /// Members and rivals of a decision, by falling confidence; `seed` is that of the intervals.

@@ -26,6 +26,7 @@ use super::catalogue::{Context, Effect};
 use super::controller::{Feedback, Kind as Acts};
 use super::data::Data;
 use super::payload::Load;
+use super::thresholds::THRESHOLDS as T;
 use super::verdict::Member;
 use crate::error::{Error, Result};
 use crate::report::format::unit_of;
@@ -40,7 +41,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Longest part of a record that is simulated, s.
-pub const LONGEST: f64 = 20.0;
+pub const LONGEST: f64 = T.forward.longest;
 /// The models, in the order of every array of three.
 pub const MODELS: [&str; 3] = ["nominal", "refitted", "improved"];
 
@@ -303,7 +304,7 @@ fn run(
             each.for_each(|(o, x)| o.push(*x));
         }
         e += &ed * h;
-        if !e.iter().all(|x| x.abs() < 10.0 * span) {
+        if !e.iter().all(|x| x.abs() < T.forward.far * span) {
             return Err(Error::Infeasible(format!(
                 "the simulated robot leaves the recorded motion at {:.3} s",
                 i as f64 * r.dt

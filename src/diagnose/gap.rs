@@ -8,6 +8,7 @@
 
 use super::data::Data;
 use super::noise::{LINES, between_periods, spectrum};
+use super::thresholds::THRESHOLDS as T;
 use crate::signals::series::Series;
 use crate::signals::wiener::triangle;
 
@@ -43,7 +44,7 @@ pub fn excess(record: &Series, e: &[f64]) -> (f64, f64) {
     let n = record.sound() as f64;
     let Some(cycle) = record.cycle else {
         let total: f64 = e.iter().map(|v| v * v).sum();
-        return ((total - n).max(-0.1 * n), 0.0);
+        return ((total - n).max(-T.measure.negative * n), 0.0);
     };
     let periods = record.periods() as f64;
     let mean = record.period_mean(e);
@@ -72,12 +73,15 @@ pub fn excess(record: &Series, e: &[f64]) -> (f64, f64) {
             let mut rest = s[low..].to_vec();
             rest.sort_by(f64::total_cmp);
             let level = rest[rest.len() / 2].max(1.0);
-            let above: f64 = s[..low].iter().map(|v| (v - 1.6 * level).max(0.0)).sum();
+            let above: f64 = s[..low]
+                .iter()
+                .map(|v| (v - T.measure.slow * level).max(0.0))
+                .sum();
             above / LINES as f64 * n * (periods - 1.0) / periods
         }
         None => 0.0,
     };
-    let broad = (variance - 1.25).max(0.0) * n;
+    let broad = (variance - T.measure.broad).max(0.0) * n;
     (repeating, slow.max(broad))
 }
 
@@ -118,7 +122,7 @@ pub fn joints(
                 sum += e.iter().map(|v| v * v).sum::<f64>();
                 count += r.sound() as f64;
                 // relative errors below about 20 Hz, torque and residual filtered alike
-                let w = ((0.024 / r.dt).round() as usize).max(1);
+                let w = ((T.measure.low_pass / r.dt).round() as usize).max(1);
                 let low = |x: &[f64]| -> f64 { triangle(x, w).iter().map(|v| v * v).sum() };
                 filtered += low(e);
                 torque += low(&r.silenced(r.torque(j)));
@@ -204,14 +208,14 @@ pub fn is_odd(r: &Series) -> bool {
         let even: f64 = (0..cycle)
             .map(|i| (0.5 * (q[i] + q[(i + cycle / 2) % cycle]) - home).powi(2))
             .sum();
-        even < 1e-4 * power
+        even < T.measure.odd * power
     })
 }
 
 /// Share of the gap that a function of position and velocity of each actuator could explain: bins of
 /// the state of a joint are filled from odd periods (or halves) and tried on even ones.
 pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
-    const BINS: usize = 14;
+    const BINS: usize = T.measure.bins;
     let (mut gap, mut left) = (0.0, 0.0);
     for (j, e) in residual.iter().enumerate() {
         let [lo, hi] = data.range[j];
@@ -226,7 +230,7 @@ pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
         // one record trains, the others of the fit are predicted, and the other way round
         let mut sums = vec![[(0.0, 0.0); 2]; 2 * BINS * BINS];
         let part = |k: usize, i: usize, r: &Series| -> usize {
-            let chunk = r.cycle.unwrap_or(r.count.div_ceil(8));
+            let chunk = r.cycle.unwrap_or(r.count.div_ceil(T.measure.pieces));
             (i / chunk + k) % 2
         };
         for pass in 0..2 {
@@ -241,7 +245,7 @@ pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
                         sums[b][side].1 += 1.0;
                     } else {
                         let (sum, count) = sums[b][1 - side];
-                        let guess = sum / (count + 3.0);
+                        let guess = sum / (count + T.measure.bin_prior);
                         gap += x * x - 1.0;
                         left += (x - guess).powi(2) - 1.0;
                     }
@@ -249,5 +253,6 @@ pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
             }
         }
     }
-    (gap > 0.02 * (data.fitted * data.joints()) as f64).then(|| (1.0 - left / gap).clamp(0.0, 1.0))
+    (gap > T.measure.least * (data.fitted * data.joints()) as f64)
+        .then(|| (1.0 - left / gap).clamp(0.0, 1.0))
 }

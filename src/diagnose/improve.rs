@@ -40,7 +40,7 @@ pub fn improve(
     let plant = cx.data.plant;
     let mut robot = plant.with_values(phi);
     let mut remarks = Vec::new();
-    for f in findings.iter().filter(|f| f.member && f.confidence >= 0.5) {
+    for f in findings.iter().filter(|f| f.is_claim()) {
         let Some(effect) = effects.iter().find(|e| e.card().name == f.effect) else {
             continue;
         };

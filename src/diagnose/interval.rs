@@ -1,6 +1,6 @@
 //! Interval of the share that an effect explains: a block bootstrap over whole seconds.
 //!
-//! Residuals are autocorrelated, so single samples are no independent draws; blocks of [`BLOCK`]
+//! Residuals are autocorrelated, so single samples are no independent draws; blocks of a second
 //! (or a sixteenth of the fitted time, where that is shorter) nearly are (Künsch 1989). With the energies of block `b` without the effect `w_b`, with it `a_b`,
 //! and of the whole gap above the noise `t_b`, resampled with replacement within the fitted records:
 //!
@@ -9,12 +9,9 @@
 //! ```
 
 use super::data::Data;
+use super::thresholds::THRESHOLDS as T;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// Longest length of a block, s.
-pub const BLOCK: f64 = 1.0;
-const RESAMPLES: usize = 400;
 
 /// The 95 % interval of `explains` from residuals of the gap (`total`), of the fit without the effect
 /// and of the fit with it, by actuator in units of the noise. With fewer than eight blocks nothing
@@ -29,7 +26,7 @@ pub fn explained(
 ) -> [f64; 2] {
     let fitted = data.records.iter().filter(|r| r.fit);
     let time: f64 = fitted.map(|r| r.count as f64 * r.dt).sum();
-    let block = BLOCK.min(time / 16.0);
+    let block = T.interval.block.min(time / T.interval.blocks);
     let mut blocks = Vec::new();
     for (k, r) in data.records.iter().enumerate().filter(|(_, r)| r.fit) {
         let size = ((block / r.dt).round() as usize).max(1);
@@ -50,16 +47,18 @@ pub fn explained(
     let ratio = |sum: [f64; 2]| sum[0] / sum[1].max(1e-9);
     let add = |a: [f64; 2], b: &[f64; 2]| [a[0] + b[0], a[1] + b[1]];
     let whole = blocks.iter().fold([0.0; 2], add);
-    if blocks.len() < 8 || whole[0] <= 0.0 || whole[1] <= 0.0 {
+    if blocks.len() < T.interval.least || whole[0] <= 0.0 || whole[1] <= 0.0 {
         return [0.0, 1.0];
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut drawn: Vec<f64> = (0..RESAMPLES)
+    let mut drawn: Vec<f64> = (0..T.interval.resamples)
         .map(|_| {
             let draw = |sum, _| add(sum, &blocks[rng.random_range(0..blocks.len())]);
             ratio((0..blocks.len()).fold([0.0; 2], draw)) / ratio(whole)
         })
         .collect();
     drawn.sort_by(f64::total_cmp);
-    [0.025, 0.975].map(|p| (explains * drawn[(p * RESAMPLES as f64) as usize]).clamp(0.0, 1.0))
+    T.interval
+        .quantiles
+        .map(|p| (explains * drawn[(p * T.interval.resamples as f64) as usize]).clamp(0.0, 1.0))
 }

@@ -4,6 +4,7 @@ use super::controller::BANDWIDTH;
 use super::finding::Finding;
 use super::forward::MODELS;
 use super::result::Diagnosis;
+use super::thresholds::THRESHOLDS;
 use serde_json::{Map, Value, json};
 
 /// A number with five significant digits, `null` where it is not finite.
@@ -171,6 +172,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         "prior_surprise": numbers(&d.surprise),
         "prior_closeness": numbers(&d.closeness),
         "torque_window": number(d.window),
+        "thresholds": THRESHOLDS,
         "warnings": d.warnings,
         "seconds": number(seconds),
     });

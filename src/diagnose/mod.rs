@@ -13,6 +13,7 @@
 //! | nominal | [`data`], [`rigid`], [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
 //! | search | [`search`], [`verdict`] | sets of effects, rivals, confidence |
+//! | constants | [`thresholds`] | what the verdict rests on, with units and origin |
 //! | intervals | [`interval`] | how sure the share is that an effect explains |
 //! | gap | [`gap`] | residuals against noise: joints, odd, even, non-periodic |
 //! | simulation | [`forward`], [`controller`] | the robot simulated under the same commands, before and after |
@@ -45,6 +46,7 @@ mod reversal;
 pub mod rigid;
 pub mod search;
 pub mod settings;
+pub mod thresholds;
 pub mod traces;
 pub mod verdict;
 pub mod window;

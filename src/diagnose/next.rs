@@ -23,6 +23,7 @@ use super::evidence::Evidence;
 use super::finding::Finding;
 use super::search::Candidate;
 use super::settings::Settings;
+use super::thresholds::THRESHOLDS as T;
 use crate::trajectory::Trajectory;
 use motions::Motions;
 use rand::SeedableRng;
@@ -33,20 +34,9 @@ use trial::{COARSE, FINE, Placed, Target, Trial};
 /// Name of the nominal model where it stands in the place of a rival.
 pub const NOMINAL: &str = "nominal_model";
 /// Visibility below which an effect is invisible in a motion.
-pub const INVISIBLE: f64 = 0.01;
-/// Overlap that is good enough.
-const APART: f64 = 0.02;
-/// Part of the present overlap that a motion must come below to be worth a run.
-const BETTER: f64 = 0.95;
-/// Overlap of a pair in all first motions from which on no motion tells it apart.
-const ALIAS: f64 = 0.995;
+pub const INVISIBLE: f64 = T.next.invisible;
 /// Random steps that are judged side by side.
 const BATCH: usize = 8;
-/// Size of the first random steps, their decay, and the smallest.
-const STEP: [f64; 3] = [0.3, 0.8, 0.05];
-/// Rivals of an effect, and invisible effects, that are looked at.
-const RIVALS: usize = 2;
-const HIDDEN: usize = 8;
 
 /// The next experiment.
 #[derive(Debug, Clone)]
@@ -109,7 +99,7 @@ pub fn propose(
             seen.min_by(|a, b| a.0.total_cmp(&b.0))
         })
         .collect();
-    let helps = |i: &usize| lowest[*i].is_some_and(|(o, _)| o < ALIAS);
+    let helps = |i: &usize| lowest[*i].is_some_and(|(o, _)| o < T.next.alias);
     let shows = |i: &usize| lowest[*i].is_some_and(|(o, _)| o < 1.0 - 2.0 * INVISIBLE);
     // pairs in their order, then what can be shown best
     let mut order: Vec<usize> = (0..first_hidden).filter(helps).collect();
@@ -126,7 +116,7 @@ pub fn propose(
         let mut of = vec![&targets[i]];
         of.extend(&targets[first_hidden..]);
         let predicted = trial.overlaps(&best.fourier, FINE, &of);
-        let Some(overlap) = predicted[0].filter(|o| *o < BETTER * now[i]) else {
+        let Some(overlap) = predicted[0].filter(|o| *o < T.next.better * now[i]) else {
             continue;
         };
         let also = (first_hidden..targets.len()).zip(&predicted[1..]);
@@ -148,17 +138,20 @@ pub fn propose(
 
 /// The effect that is believed most with each of its rivals.
 fn pairs<'a>(effects: &'a [Box<dyn Effect>], findings: &'a [Finding]) -> Vec<Target<'a>> {
-    let Some(main) = findings.iter().find(|f| f.member && f.confidence > 0.02) else {
+    let Some(main) = findings
+        .iter()
+        .find(|f| f.member && f.confidence > T.next.believed)
+    else {
         return Vec::new();
     };
     let near = |f: &&Finding| {
-        !f.member && f.effect != main.effect && f.confidence > 0.08 * main.confidence
+        !f.member && f.effect != main.effect && f.confidence > T.next.near * main.confidence
     };
     let placed = |f: &'a Finding| Placed::of_finding(effects, f);
     findings
         .iter()
         .filter(near)
-        .take(RIVALS)
+        .take(T.next.rivals)
         .filter_map(|rival| Some(Target::Pair(placed(main)?, placed(rival)?)))
         .collect()
 }
@@ -187,7 +180,7 @@ fn hidden<'a>(
     let mut known: Vec<usize> = Vec::new();
     for c in list {
         let absorbed = c.projected.visibility(None) < INVISIBLE;
-        if absorbed && !known.contains(&c.effect) && all.len() < HIDDEN {
+        if absorbed && !known.contains(&c.effect) && all.len() < T.next.hidden {
             known.push(c.effect);
             all.extend(shown(Placed::of_candidate(effects, c)));
         }
@@ -205,9 +198,9 @@ fn improved(
     rng: &mut ChaCha8Rng,
 ) -> Trajectory {
     let (mut lowest, mut best) = begin;
-    let [mut step, decay, smallest] = STEP;
+    let [mut step, decay, smallest] = T.next.step;
     for _ in 0..tries.div_ceil(BATCH) {
-        if lowest < APART {
+        if lowest < T.next.apart {
             break;
         }
         let batch: Vec<_> = (0..BATCH)

@@ -64,10 +64,7 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
 }
 
 fn claims(d: &Diagnosis) -> Vec<&Finding> {
-    d.findings
-        .iter()
-        .filter(|f| f.member && f.confidence >= 0.5)
-        .collect()
+    d.findings.iter().filter(|f| f.is_claim()).collect()
 }
 
 /// The page.
@@ -168,7 +165,7 @@ fn effects(d: &Diagnosis) -> Markup {
     let row = |f: &Finding| {
         vec![
             html! {
-                @if f.member && f.confidence >= 0.5 { strong { (f.title) } } @else { (f.title) }
+                @if f.is_claim() { strong { (f.title) } } @else { (f.title) }
                 div class="code" { (f.equation) }
             },
             html! { @if f.joints.is_empty() { "whole robot" } @else { (f.joints.join(", ")) } },
@@ -616,7 +613,7 @@ fn next(d: &Diagnosis) -> Markup {
                 (proposed(n))
             }
             None => {
-                p { @if d.findings.iter().any(|f| f.member && f.confidence >= 0.5) {
+                p { @if d.findings.iter().any(Finding::is_claim) {
                     "The effects that are claimed are told apart from their rivals by the records at hand."
                 } @else { "No pair of effects is near enough to the gap to be worth separating." } }
             }

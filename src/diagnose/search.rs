@@ -3,6 +3,7 @@
 use super::catalogue::{Context, Effect, Place, Shape};
 use super::column::Column;
 use super::evidence::{Evidence, Fit, Projected};
+use super::thresholds::THRESHOLDS as T;
 use rayon::prelude::*;
 
 /// An effect at a place with its best shape.
@@ -104,7 +105,7 @@ pub fn best_shape(
     let best = parts.into_iter().flatten().reduce(better);
     let (gain, mut shape) = best?;
     // between grid points
-    if gain > 20.0 {
+    if gain > T.shapes.refined {
         let mut top = gain;
         let constants = shape.constants.len();
         let bounds: Vec<[f64; 2]> = (0..constants)
@@ -119,7 +120,7 @@ pub fn best_shape(
                 })
             })
             .collect();
-        for step in [1.3f64, 1.12, 1.05] {
+        for step in T.shapes.steps {
             for k in 0..constants {
                 if !effect.refinable(k) {
                     continue;
@@ -128,14 +129,15 @@ pub fn best_shape(
                     loop {
                         let mut next = shape.clone();
                         next.constants[k] *= factor;
-                        if next[k].abs() < bounds[k][0] / 1.5 || next[k].abs() > bounds[k][1] * 1.2
+                        if next[k].abs() < bounds[k][0] / T.shapes.below
+                            || next[k].abs() > bounds[k][1] * T.shapes.above
                         {
                             break;
                         }
                         let tried =
                             try_shape(evidence, cx, effect, place, &next, beside, before, true);
                         match tried {
-                            Some((gain, ..)) if gain > top * 1.0005 => {
+                            Some((gain, ..)) if gain > top * T.shapes.better => {
                                 top = gain;
                                 shape = next;
                             }

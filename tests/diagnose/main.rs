@@ -7,3 +7,4 @@ mod controller;
 mod findings;
 mod next;
 mod parallel;
+mod thresholds;

@@ -4,6 +4,7 @@
 use crate::design::diagnostic::Checker;
 use crate::design::{Settings as Design, design};
 use crate::diagnose::data::Data;
+use crate::diagnose::thresholds::THRESHOLDS as T;
 use crate::plant::Plant;
 use crate::report::format::unit_of;
 use crate::robot::Robot;
@@ -14,20 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Periods that a motion is run.
-pub(super) const PERIODS: u32 = 3;
-/// Period of the designed motions, s, and factors on it.
-const PERIOD: f64 = 8.0;
-const SLOWER: [f64; 3] = [1.0, 2.5, 6.0];
-/// Harmonics of the designed motions, of joints and of a platform.
-const HARMONICS: [usize; 2] = [5, 3];
-/// Periods of the random motions, s, how many of each, and their harmonics.
-const RANDOM: [f64; 3] = [4.0, 10.0, 24.0];
-const DRAWS: usize = 2;
-const LINES: [u32; 4] = [1, 3, 5, 7];
-/// Factor by which a motion shrinks about its middle while it breaks a limit, and how often: a random
-/// one, and one that was inside before it was changed.
-const SHRINK: f64 = 0.8;
-const OFTEN: [usize; 2] = [16, 4];
+pub(super) const PERIODS: u32 = T.motions.periods;
 
 /// Motions of one robot.
 pub(super) struct Motions<'a> {
@@ -81,8 +69,8 @@ impl<'a> Motions<'a> {
         let mut all = Vec::new();
         for (k, grid) in [Grid::Odd, Grid::Full].into_iter().enumerate() {
             let wanted = Design {
-                harmonics: HARMONICS[usize::from(parallel.is_some())],
-                period: PERIOD,
+                harmonics: T.motions.harmonics[usize::from(parallel.is_some())],
+                period: T.motions.period,
                 grid,
                 seed: seed + k as u64,
                 starts: Some(1),
@@ -93,10 +81,10 @@ impl<'a> Motions<'a> {
             let Ok(found) = design(self.plant, &wanted) else {
                 continue;
             };
-            for factor in SLOWER {
+            for factor in T.motions.slower {
                 let mut motion = found.trajectory.fourier.clone();
                 motion.period *= factor;
-                all.push((motion, OFTEN[1]));
+                all.push((motion, T.motions.often[1]));
             }
         }
         all
@@ -104,20 +92,23 @@ impl<'a> Motions<'a> {
 
     /// Random motions about the middle of the records.
     fn random(&self, rng: &mut ChaCha8Rng) -> Vec<(Fourier, usize)> {
-        let periods = RANDOM.iter().flat_map(|p| [*p; DRAWS]);
+        let periods = T.motions.random.iter();
+        let periods = periods.flat_map(|p| [*p; T.motions.draws]);
         periods
             .filter_map(|period| {
                 let joints = self.range.iter().map(|[a, b]| {
-                    let mut draw =
-                        |h: u32| (b - a) / 3.0 / f64::from(h) * rng.random_range(-1.0..1.0);
+                    let mut draw = |h: u32| {
+                        (b - a) / T.motions.spread / f64::from(h) * rng.random_range(-1.0..1.0)
+                    };
                     Series {
                         constant: 0.5 * (a + b),
-                        sin: LINES.map(&mut draw).to_vec(),
-                        cos: LINES.map(&mut draw).to_vec(),
+                        sin: T.motions.lines.map(&mut draw).to_vec(),
+                        cos: T.motions.lines.map(&mut draw).to_vec(),
                     }
                 });
-                let motion = Fourier::new(period, LINES.to_vec(), joints.collect()).ok()?;
-                Some((motion, OFTEN[0]))
+                let motion =
+                    Fourier::new(period, T.motions.lines.to_vec(), joints.collect()).ok()?;
+                Some((motion, T.motions.often[0]))
             })
             .collect()
     }
@@ -140,7 +131,7 @@ impl<'a> Motions<'a> {
 
     /// A changed motion shrunk about its middle until all limits hold; `None` where that fails.
     pub fn kept(&self, motion: Fourier) -> Option<Trajectory> {
-        Some(self.trajectory(self.inside(motion, OFTEN[1])?))
+        Some(self.trajectory(self.inside(motion, T.motions.often[1])?))
     }
 
     fn inside(&self, mut motion: Fourier, often: usize) -> Option<Fourier> {
@@ -150,7 +141,7 @@ impl<'a> Motions<'a> {
             }
             for s in &mut motion.joints {
                 let each = s.sin.iter_mut().chain(&mut s.cos);
-                each.for_each(|v| *v *= SHRINK);
+                each.for_each(|v| *v *= T.motions.shrink);
             }
         }
         None

@@ -6,6 +6,7 @@ use crate::diagnose::data::Data;
 use crate::diagnose::evidence::{Evidence, Projected};
 use crate::diagnose::finding::Finding;
 use crate::diagnose::search;
+use crate::diagnose::thresholds::THRESHOLDS as T;
 use crate::log::Payload;
 use crate::signals::series::Series;
 use crate::trajectory::Fourier;
@@ -19,15 +20,13 @@ pub(super) struct Detail {
 
 /// While motions are compared, and in the last prediction.
 pub(super) const COARSE: Detail = Detail {
-    samples: 1500,
-    shapes: 5,
+    samples: T.next.coarse[0],
+    shapes: T.next.coarse[1],
 };
 pub(super) const FINE: Detail = Detail {
-    samples: 12_000,
-    shapes: 24,
+    samples: T.next.fine[0],
+    shapes: T.next.fine[1],
 };
-/// Energy that the believed effect must have in a motion, per row, in noise variances.
-const SEEN: f64 = 0.05;
 
 /// An effect at a place, with its shape and, where they are known, its coefficients.
 pub(super) struct Placed<'a> {
@@ -112,7 +111,7 @@ impl Target<'_> {
             Target::Pair(a, b) => {
                 let eta = a.eta?;
                 let a = a.projected(evidence, cx)?;
-                let enough = SEEN * evidence.data.fitted as f64;
+                let enough = T.next.seen * evidence.data.fitted as f64;
                 if a.z.len() != eta.len() || a.energy(eta).0 <= enough {
                     return None;
                 }
@@ -161,7 +160,7 @@ impl Trial<'_> {
         let plant = self.data.plant;
         let sampled = self.data.records.first()?.dt;
         let wanted = (motion.period / sampled).round() as usize;
-        let count = wanted.clamp(64, detail.samples);
+        let count = wanted.clamp(T.next.least_samples, detail.samples);
         let x = motion.motion(count);
         let n = self.data.joints();
         let record = Series {
@@ -176,7 +175,7 @@ impl Trial<'_> {
             tau: vec![0.0; n * count],
             measured: vec![true; count],
             position_noise: vec![0.0; n],
-            band: 20.0,
+            band: T.next.band,
             payload: Payload::None,
             order: 0,
             remarks: Vec::new(),

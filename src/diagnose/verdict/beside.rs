@@ -1,0 +1,202 @@
+//! A member beside the others: fits and residuals without it and with it.
+
+use super::super::evidence::{Fit, Projected};
+use super::super::gap;
+use super::super::search::Candidate;
+use super::super::thresholds::THRESHOLDS as T;
+use super::state::{State, energy, others};
+
+/// What the judgement of a member rests on.
+pub struct Beside<'a> {
+    /// what the judgement of sets rests on
+    pub st: &'a State<'a>,
+    /// the whole set
+    pub set: &'a [Candidate],
+    /// the member
+    pub member: &'a Candidate,
+    /// the others
+    pub rest: Vec<Candidate>,
+    /// fit of the whole set
+    pub with: Fit,
+    /// residual without the member and with it
+    pub residual: [Vec<Vec<f64>>; 2],
+    /// by how much `J` falls through the member
+    pub gain: f64,
+    /// by how much the penalty of the prior falls
+    pub fall: f64,
+    /// penalty of the prior without the member
+    pub surprise_without: f64,
+    /// penalty of the prior with all
+    pub surprise_after: f64,
+    /// gap by actuator on fitted records without the member
+    pub without: Vec<f64>,
+    /// the same with all
+    pub after: &'a [f64],
+    /// joints on whose rows it acts
+    pub joints: Vec<usize>,
+    /// whether it explains enough to be a finding, 0 to 1
+    pub matters: f64,
+    /// whether it shows in the parameters of the nominal model rather than in the residual
+    pub frozen: bool,
+}
+
+impl<'a> Beside<'a> {
+    /// Member `i` of a set; `after` is the gap with the set.
+    pub fn new(
+        st: &'a State<'a>,
+        set: &'a [Candidate],
+        i: usize,
+        after: &'a [f64],
+        surprise_after: f64,
+    ) -> Self {
+        let member = &set[i];
+        let rest = others(set, i);
+        let (f0, r0) = st.fit(&rest);
+        let (with, r1) = st.fit(set);
+        let without = st.gap(&r0, true);
+        let surprise_without = st.surprise(&f0, &r0);
+        let mut out = Beside {
+            matters: st.matters(member, &without, after),
+            gain: with.gain - f0.gain,
+            fall: surprise_without - surprise_after,
+            residual: [r0, r1],
+            joints: st.joints_of(member),
+            frozen: false,
+            st,
+            set,
+            member,
+            rest,
+            with,
+            surprise_without,
+            surprise_after,
+            without,
+            after,
+        };
+        let rows = st.evidence.data.fitted as f64;
+        // what an effect explains of the residual may be too little to judge it by, although its
+        // parameters stand out
+        let faint = out.in_rows() * out.matters < T.hidden.faint;
+        let little = (T.hidden.of_gain * out.gain).max(T.hidden.of_entry * T.entry.gain * rows);
+        out.frozen = st.may_hide(set, i)
+            && out.fall > T.hidden.surprise
+            && (faint || out.gain_in_rows() < little);
+        out
+    }
+
+    /// Columns of the others.
+    pub fn beside(&self) -> Vec<&Projected> {
+        self.rest.iter().map(|c| &c.projected).collect()
+    }
+
+    fn fitted(&self) -> f64 {
+        self.st.evidence.data.fitted as f64
+    }
+
+    fn held(&self) -> usize {
+        let data = self.st.evidence.data;
+        data.rows() - data.fitted
+    }
+
+    /// Part of the gain that comes from the residual.
+    fn gain_in_rows(&self) -> f64 {
+        self.gain - self.fall
+    }
+
+    fn in_rows(&self) -> f64 {
+        T.confidence.gain.above(self.gain_in_rows() / self.fitted())
+    }
+
+    /// Whether the gain is large enough, 0 to 1.
+    pub fn size(&self) -> f64 {
+        match self.frozen {
+            true => T.confidence.surprise.above(self.fall),
+            false => self.in_rows(),
+        }
+    }
+
+    /// Share of the gap on its joints that goes. The least that counts is taken off.
+    fn share_of(&self, without: &[f64], with: &[f64], rows: f64) -> f64 {
+        let sum = |v: &[f64]| self.joints.iter().map(|j| v[*j].max(0.0)).sum::<f64>();
+        let (w, a) = (sum(without), sum(with));
+        let slack = T.gap.slack * rows * self.joints.len() as f64;
+        let there = (w - slack).max(w * T.gap.slack_share).max(1e-9);
+        ((w - a) / there).min(1.0)
+    }
+
+    /// Share that it takes away of the gap on its joints or, where it is hidden, of the unlikeliness of the
+    /// parameters.
+    pub fn share(&self) -> f64 {
+        let free = self.st.evidence.data.parameters.len() as f64;
+        match self.frozen {
+            true => self.fall / (self.surprise_without - free).max(1.0),
+            false => self.share_of(&self.without, self.after, self.fitted()),
+        }
+    }
+
+    /// The same on holdout records.
+    pub fn share_held(&self) -> f64 {
+        let held = self.held();
+        if held == 0 || self.frozen {
+            return self.share();
+        }
+        let [w, a] = self.residual.each_ref().map(|e| self.st.gap(e, false));
+        self.share_of(&w, &a, held as f64)
+    }
+
+    /// Gain on holdout records per row against that on fitted ones: 1 where the same effect is at work there.
+    pub fn repeats(&self) -> f64 {
+        let (data, held) = (self.st.evidence.data, self.held());
+        if held == 0 || self.frozen {
+            return 1.0;
+        }
+        let [w, a] = &self.residual;
+        let kept = |e: &[Vec<f64>]| energy(e, data.fitted..data.rows());
+        (kept(w) - kept(a)) / held as f64 / (self.gain_in_rows() / self.fitted()).max(1e-9)
+    }
+
+    /// What it leaves on its joints, as the tests count it. Unit: noise variances.
+    pub fn energy_left(&self) -> f64 {
+        let data = self.st.evidence.data;
+        let rows = self.fitted();
+        let all = gap::energies(data, &self.residual[1], |r| r.fit);
+        self.joints
+            .iter()
+            .map(|j| all[*j][0] + all[*j][1] + data.noise[*j].excess * rows)
+            .map(|v| v.max(0.0))
+            .sum()
+    }
+
+    /// What stays unlikely of the parameters.
+    pub fn unlikely_left(&self) -> f64 {
+        let free = self.st.evidence.data.parameters.len() as f64;
+        (self.surprise_after - free).max(0.0)
+    }
+
+    /// Share of the whole gap that it explains: of the frozen model's, where it hides in the parameters.
+    pub fn explains(&self) -> f64 {
+        let st = self.st;
+        let after = st.above(self.after, true);
+        match self.frozen {
+            true => 1.0 - after / self.whole(&st.evidence.r, true).max(1e-9),
+            false => (st.above(&self.without, true) - after) / st.total.max(1e-9),
+        }
+    }
+
+    /// The same on holdout records.
+    pub fn explains_held(&self) -> f64 {
+        let st = self.st;
+        if self.held() == 0 {
+            return self.explains();
+        }
+        let [w, a] = &self.residual;
+        let held = |e: &[Vec<f64>]| self.whole(e, false);
+        match self.frozen {
+            true => 1.0 - held(a) / held(&st.evidence.r).max(1e-9),
+            false => (held(w) - held(a)) / held(&st.fit(&[]).1).max(1e-9),
+        }
+    }
+
+    fn whole(&self, residual: &[Vec<f64>], fit: bool) -> f64 {
+        self.st.above(&self.st.gap(residual, fit), fit)
+    }
+}

@@ -1,0 +1,117 @@
+//! The confidence of a member: a product of conditions, shared with its rivals.
+
+use super::super::decoy;
+use super::super::search::Candidate;
+use super::super::thresholds::THRESHOLDS as T;
+use super::beside::Beside;
+use super::predict::{predicts, shown_on_both, unsteady};
+use super::rivals::{Rival, against, least_loss, rivals};
+use super::state::State;
+
+/// One effect of the set.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// effect, place, shape
+    pub candidate: Candidate,
+    /// 0 to 1
+    pub confidence: f64,
+    /// the same of the member or one of its rivals, 0 to 1
+    pub together: f64,
+    /// share of the gap on fitted records
+    pub explains: f64,
+    /// share of the gap on holdout records
+    pub holdout: f64,
+    /// share of the effect's energy that the nominal model cannot absorb
+    pub visibility: f64,
+    /// the most that a decoy gains of its own, over what the effect gains; not of an effect that shows in
+    /// parameters alone
+    pub decoys: Option<f64>,
+    /// what coefficients of their own for every fitted record gain, over what the effect gains; not of an
+    /// effect that remembers, nor of whole sets of inertial parameters that show in parameters alone
+    pub unsteady: Option<f64>,
+    /// rivals by falling weight
+    pub rivals: Vec<Rival>,
+    /// standard deviations of the coefficients
+    pub std: Vec<f64>,
+    /// whether it shows in the parameters that the nominal model would need rather than in a residual
+    pub frozen: bool,
+}
+
+/// Judges member `i` of a set; `after` is the gap by actuator with the set, `surprise_after` the penalty of the
+/// prior.
+pub fn judge(
+    st: &State,
+    list: &[Candidate],
+    set: &[Candidate],
+    i: usize,
+    after: &[f64],
+    surprise_after: f64,
+) -> Member {
+    let m = Beside::new(st, set, i, after, surprise_after);
+    let (c, evidence) = (m.member, st.evidence);
+    let rivals = rivals(&m, list);
+    let effect = &st.effects[c.effect];
+    let columns = effect.columns(st.cx, &c.place, &c.shape, false);
+    let beside = m.beside();
+    // what shows in parameters alone is no signal that could be moved
+    let decoys = (!m.frozen).then(|| {
+        let moved = (columns.as_slice(), &c.projected);
+        decoy::largest(evidence, moved, &c.eta, &beside, m.gain)
+    });
+    // whole sets of inertial parameters fit anything in a single record
+    let unsteady = match st.remembers(c) || m.frozen && columns.len() > T.hidden.columns {
+        true => None,
+        false => unsteady(evidence, &columns, &beside, m.with.gain, m.gain),
+    };
+    let together = together(&m, &rivals, decoys, unsteady);
+    Member {
+        candidate: c.clone(),
+        confidence: together / (1.0 + against(st, c.effect, &rivals)),
+        together,
+        explains: m.explains().clamp(0.0, 1.0),
+        holdout: m.explains_held().clamp(-1.0, 1.0),
+        visibility: c.projected.visibility(Some(&c.eta)),
+        decoys,
+        unsteady,
+        rivals,
+        std: Vec::new(),
+        frozen: m.frozen,
+    }
+}
+
+/// The product of all conditions, 0 to 1: that the member is there, or one of its rivals.
+fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<f64>) -> f64 {
+    let data = m.st.evidence.data;
+    let [r0, r1] = &m.residual;
+    let predicted = match m.frozen || m.st.remembers(m.member) {
+        true => 1.0,
+        false => predicts(data, r0, r1),
+    };
+    m.size()
+        * shown_on_both(data, m.member, r0, r1)
+        * unsteady.map_or(1.0, |u| T.confidence.unsteady.below(u))
+        * if m.frozen { 1.0 } else { m.matters }
+        * T.confidence.predicts.above(predicted)
+        * decoys.map_or(1.0, |d| T.confidence.decoys.below(d))
+        * explains_enough(m, rivals)
+        * holds(m)
+}
+
+/// Whether a member takes away enough of the gap on its joints.
+fn explains_enough(m: &Beside, rivals: &[Rival]) -> f64 {
+    let share = m.share();
+    // nothing else may be odd about the parameters
+    if m.frozen {
+        return T.confidence.parameters.above(share);
+    }
+    // an effect that explains a part only is believed where nothing else comes near that part
+    let best = least_loss(m.st, m.member.effect, rivals);
+    let alone = T.confidence.alone.above(best) * T.confidence.alone_share.above(share);
+    T.confidence.share.above(share).max(alone)
+}
+
+/// Whether it does so on holdout records.
+fn holds(m: &Beside) -> f64 {
+    let share = T.confidence.holdout.above(m.share_held());
+    share.max(T.confidence.repeats.above(m.repeats()))
+}

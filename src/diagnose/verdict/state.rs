@@ -1,0 +1,164 @@
+//! Energies of the gap: what a set of effects takes from it, joint by joint.
+
+use super::super::catalogue::{Context, Effect};
+use super::super::evidence::{Evidence, Fit, Projected};
+use super::super::gap;
+use super::super::search::Candidate;
+use super::super::thresholds::THRESHOLDS as T;
+use std::ops::Range;
+
+/// What the judgement of sets rests on.
+pub struct State<'a> {
+    /// whitened records with the nominal model
+    pub evidence: &'a Evidence<'a>,
+    /// what columns of effects are made from
+    pub cx: &'a Context<'a>,
+    /// the catalogue
+    pub effects: &'a [Box<dyn Effect>],
+    /// what a sound model leaves, per row
+    pub floor: f64,
+    /// gap of the refitted nominal model above that, fitted records
+    pub total: f64,
+}
+
+impl<'a> State<'a> {
+    /// Starts from the fit of no effect: the gap of the refitted nominal model.
+    pub fn new(
+        evidence: &'a Evidence<'a>,
+        cx: &'a Context<'a>,
+        effects: &'a [Box<dyn Effect>],
+    ) -> Self {
+        let mut st = State {
+            evidence,
+            cx,
+            effects,
+            floor: 0.0,
+            total: 0.0,
+        };
+        let rows = evidence.data.fitted as f64;
+        let before = st.gap(&st.fit(&[]).1, true);
+        // no more than a part of a gap that is small itself
+        let largest = before.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+        st.floor = T.gap.floor.min(T.gap.floor_share * largest);
+        st.total = st.above(&before, true);
+        st
+    }
+}
+
+impl State<'_> {
+    /// By how much `J` falls with a set.
+    pub fn gain(&self, set: &[Candidate]) -> f64 {
+        let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
+        self.evidence.fit(&set).gain
+    }
+
+    /// Fit of a set, and its whitened residual.
+    pub fn fit(&self, set: &[Candidate]) -> (Fit, Vec<Vec<f64>>) {
+        let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
+        let fit = self.evidence.fit(&set);
+        let residual = self.evidence.residual(&set, &fit);
+        (fit, residual)
+    }
+
+    /// Gap by actuator on fitted records.
+    pub fn gap(&self, residual: &[Vec<f64>], fitted: bool) -> Vec<f64> {
+        let plain = self.evidence.unwhitened(residual);
+        gap::energies(self.evidence.data, &plain, |r| r.fit == fitted)
+            .into_iter()
+            .map(|[a, b]| a + b)
+            .collect()
+    }
+
+    /// Gap of all actuators above what a sound model leaves.
+    pub fn above(&self, gap: &[f64], fitted: bool) -> f64 {
+        let data = self.evidence.data;
+        let rows = match fitted {
+            true => data.fitted,
+            false => data.rows() - data.fitted,
+        };
+        gap.iter()
+            .map(|v| (v - self.floor * rows as f64).max(0.0))
+            .sum()
+    }
+
+    /// Penalty of the prior with a set.
+    pub fn surprise(&self, fit: &Fit, residual: &[Vec<f64>]) -> f64 {
+        let fitted = self.evidence.data.fitted;
+        self.evidence.j0 - fit.gain - energy(residual, 0..fitted)
+    }
+
+    /// Whether member `i` may show in nothing but the parameters that the nominal model would need.
+    /// Not where another one shows on its joints, or hides there and is far larger: what that one's
+    /// formula misses moves them, too.
+    pub fn may_hide(&self, set: &[Candidate], i: usize) -> bool {
+        let hides = |c: &Candidate| self.effects[c.effect].hides();
+        let larger = |c: &Candidate| !hides(c) || c.gain > T.hidden.far * set[i].gain;
+        let shown = |c: &Candidate| larger(c) && c.place.meets(&set[i].place);
+        hides(&set[i]) && !set.iter().any(shown)
+    }
+
+    /// Joints on whose rows an effect acts most.
+    pub fn joints_of(&self, c: &Candidate) -> Vec<usize> {
+        c.place.actuators(self.evidence.data.joints())
+    }
+
+    /// Whether an effect depends on what went on before a record began.
+    pub fn remembers(&self, c: &Candidate) -> bool {
+        self.effects[c.effect].remembers()
+    }
+
+    /// Whether an effect explains enough to be a finding, 0 to 1, from the gap by actuator without it
+    /// and with it. An effect that explains almost nothing is not a finding, nor is one in a gap no larger
+    /// than a sound model leaves.
+    pub fn matters(&self, c: &Candidate, without: &[f64], with: &[f64]) -> f64 {
+        let rows = self.evidence.data.fitted as f64;
+        let joints = self.joints_of(c);
+        let over = |gap: &[f64]| -> f64 {
+            let floor = self.floor * rows;
+            joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
+        };
+        let seen = (over(without) - over(with)) / over(without).max(1e-9);
+        let explains = (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9);
+        let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+        let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
+        let ringing = match self.effects[c.effect].rings(&c.shape) {
+            true => T.matters.ringing.above(own),
+            false => 1.0,
+        };
+        T.matters.of_joints.above(seen)
+            * T.matters.of_all.above(explains)
+            * T.matters.gap.above(there)
+            * ringing
+    }
+}
+
+/// A set without member `i`.
+pub fn others(set: &[Candidate], i: usize) -> Vec<Candidate> {
+    set.iter()
+        .enumerate()
+        .filter(|(k, _)| *k != i)
+        .map(|(_, c)| c.clone())
+        .collect()
+}
+
+/// Squares of a residual on some rows of every actuator.
+pub fn energy(residual: &[Vec<f64>], rows: Range<usize>) -> f64 {
+    let of = |e: &Vec<f64>| e[rows.clone()].iter().map(|v| v * v).sum::<f64>();
+    residual.iter().map(of).sum()
+}
+
+/// By how much coefficients are less certain than independent samples of unit noise would make them.
+pub fn inflation(residual: &[Vec<f64>], fitted: usize) -> f64 {
+    let mut power = 0.0;
+    let mut rho = 0.0;
+    for e in residual {
+        let e = &e[..fitted];
+        power += e.iter().map(|v| v * v).sum::<f64>();
+        for lag in 1..=T.gap.lags {
+            let c: f64 = e[lag..].iter().zip(e).map(|(a, b)| a * b).sum();
+            rho += 2.0 * c.max(0.0);
+        }
+    }
+    let n = (residual.len() * fitted) as f64;
+    (power / n).max(1.0).sqrt() * (1.0 + rho / power.max(1e-300)).max(1.0).sqrt()
+}
