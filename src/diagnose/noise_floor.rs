@@ -1,6 +1,9 @@
 //! Noise of the torque of every actuator, from the records: first from the scatter between periods, then
 //! limited by what a residual shows.
 
+// several arrays share the index of an actuator or a sample
+#![allow(clippy::needless_range_loop)]
+
 use super::data::Data;
 use super::noise::{LINES, Noise, Source, between_periods, spectrum};
 use crate::signals::series::Series;

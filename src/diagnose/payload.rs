@@ -19,9 +19,11 @@ use nalgebra::Matrix3;
 /// Ten parameters of a load about the origin of the frame of the body that carries it.
 pub type Load = [f64; 10];
 
-/// Standard deviations of an unknown load: wide enough to leave it free. Mass in kg, first moments in
-/// kg m, tensor in kg m².
-const FREE: [f64; 3] = [1e3, 1e3, 1e3];
+/// An unknown load has a standard deviation of the mass of the whole robot, of this at least, kg: wide
+/// enough to leave it free.
+const LIGHTEST: f64 = 10.0;
+/// Lever of that mass in the deviations of first moments and, squared, of the tensor, m.
+const LEVER: f64 = 0.5;
 
 /// Names of the free parameters.
 const NAMES: [&str; 10] = [
@@ -127,14 +129,20 @@ impl Data<'_> {
                     rows[self.start[k]..self.start[k + 1]].fill(0.0);
                 }
             }
+            let bodies = self.plant.robot().bodies.iter();
+            let mass: f64 = bodies.map(|b| b.inertia.mass()).sum();
+            let size = |c: usize| {
+                let moment = match c {
+                    0 => 0,
+                    1..=3 => 1,
+                    _ => 2,
+                };
+                mass.max(LIGHTEST) * LEVER.powi(moment)
+            };
             let free = NAMES.iter().zip(columns).enumerate();
             let free = free.map(|(c, (name, rows))| {
                 let rows = rows.into_iter().enumerate().collect();
-                (
-                    *name,
-                    Column { rows },
-                    FREE[[0, 1, 1, 1, 2, 2, 2, 2, 2, 2][c]],
-                )
+                (*name, Column { rows }, size(c))
             });
             self.free_load = Some(self.parameters.len());
             self.add_nuisances(&free.collect::<Vec<_>>());
@@ -146,9 +154,8 @@ impl Data<'_> {
     /// is does not contain it.
     pub fn start_from_load(&mut self, phi: &[f64]) {
         if let Some(at) = self.free_load {
-            for c in at..at + 10 {
-                self.parameters[c].value = phi[c];
-            }
+            let load = self.parameters[at..].iter_mut().zip(&phi[at..]);
+            load.take(10).for_each(|(p, v)| p.value = *v);
         }
     }
 

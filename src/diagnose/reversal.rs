@@ -1,6 +1,9 @@
 //! What a log of any robot may have without being at odds with its model: reversals of friction that are
 //! not perfectly sharp, and a motion close to them that friction bends faster than positions show.
 
+// several arrays share the index of an actuator or a sample
+#![allow(clippy::needless_range_loop)]
+
 use super::column::Column;
 use super::data::Data;
 use super::window::sign;
