@@ -8,7 +8,7 @@
 //! minimise over φ   ½ (φ − φ̂)ᵀ A (φ − φ̂) + D(φ ‖ φ₀)
 //! ```
 //!
-//! with the entropic distance `D` of [`consistent`](crate::identify::consistent), the barrier that keeps
+//! with the entropic distance `D` of [`consistent`], the barrier that keeps
 //! every body inside.
 
 use super::catalogue::{Context, Effect, Estimate};

@@ -16,7 +16,7 @@ pub struct Remark {
     pub values: Vec<String>,
     /// part of the model that holds it
     pub held: Option<Part>,
-    /// how a format can state it, by [`Format::name`](super::Format::name)
+    /// how a format can state it, by [`Format::name`]
     pub notes: BTreeMap<&'static str, String>,
 }
 
