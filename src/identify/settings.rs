@@ -34,7 +34,7 @@ pub enum Consistency {
     Free,
 }
 
-/// Settings of [`identify`].
+/// Settings of [`identify`](super::identify()).
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {

@@ -42,6 +42,8 @@ fn fields(source: &str) -> Vec<[String; 4]> {
 fn shown(value: &Value) -> String {
     match value {
         Value::Object(gate) => format!("{}, width {}", gate["centre"], gate["width"]),
+        // no brackets: they would be a link
+        Value::Array(all) => all.iter().map(shown).collect::<Vec<_>>().join(", "),
         other => other.to_string(),
     }
 }
