@@ -5,10 +5,10 @@
 //! of an encoder) would pass as ordinary errors of a model that has none. So the deviations of the
 //! prior are scaled by factors `s ≤ 1`, one for masses, first moments and rotors and one for tensors,
 //! that the data find likeliest (empirical Bayes; MacKay 1992). In units of the prior, with
-//! `G = WᵀW`, `b = Wᵀr` and `S = diag(s)`,
+//! `Λ = WᵀW`, `b = Wᵀr` and `A = 1 + diag(s) Λ diag(s)`,
 //!
 //! ```text
-//! −2 ln p(r | s, e) = rᵀr − bᵀ S A⁻¹ S b − gain(e) + ln det A + k_e ln N        A = 1 + S G S
+//! −2 ln p(r | s, e) = rᵀr − bᵀ diag(s) A⁻¹ diag(s) b − gain(e) + ln det A + k_e ln N
 //! ```
 //!
 //! is least over `s` *and* over the effects `e` that a refit may absorb, or none: an effect that is
@@ -29,7 +29,7 @@ use rayon::prelude::*;
 
 /// Residual, model and one set of columns as the parameters see them, in units of the prior.
 struct Reduced {
-    /// `G`
+    /// `Λ`
     gram: Mat<f64>,
     /// `b`
     pull: Mat<f64>,

@@ -6,7 +6,7 @@
 //! gain what any flexible enough signal gains from a residual that is not white:
 //!
 //! ```text
-//! z_d(t) = z(t + f_d T mod T)        gain_d = J(others) − J(others, z_d),   d = 1 … D
+//! z_d(t) = z(t + f_d T mod T)        gain_d = χ²(others) − χ²(others, z_d),   d = 1 … D
 //! ```
 //!
 //! Shifts near nothing and near half a record are left out: there a column of a motion of odd harmonics is

@@ -4,15 +4,15 @@
 //! `φ = φ₀ + δ` with prior `δ ~ N(0, P)`, residual `r = τ − W φ₀` and the columns `Z` of an effect,
 //!
 //! ```text
-//! J(δ, η) = ‖r − W δ − Z η‖² + δᵀ P⁻¹ δ          A = WᵀW + P⁻¹ = L Lᵀ,  Q = W L⁻ᵀ
-//! min over δ:  (r − Zη)ᵀ R (r − Zη)              R = 1 − Q Qᵀ
-//! gain = bᵀ S⁻¹ b,   S = Zᵀ R Z,   b = Zᵀ R r
+//! χ²(δ, η) = ‖r − W δ − Z η‖² + δᵀ P⁻¹ δ          A = WᵀW + P⁻¹ = L Lᵀ,  Q = W L⁻ᵀ
+//! min over δ:  (r − Zη)ᵀ Π (r − Zη)              Π = 1 − Q Qᵀ
+//! gain = bᵀ Λ_e⁻¹ b,   Λ_e = Zᵀ Π Z,   b = Zᵀ Π r
 //! ```
 //!
-//! `R` takes from residual and effect alike what the nominal model can absorb at the price of the
+//! `Π` takes from residual and effect alike what the nominal model can absorb at the price of the
 //! prior: with a loose prior it is the projection `1 − P_W` of a refit, with a tight one the identity
 //! of a frozen model. Both questions are one formula. The **visibility** of an effect is
-//! `ηᵀSη / ηᵀZᵀZη`.
+//! `ηᵀ Λ_e η / ηᵀZᵀZη`.
 
 use super::column::Column;
 use super::data::Data;
@@ -29,14 +29,14 @@ pub struct Projected {
     c: Mat<f64>,
     /// `ZᵀZ` over fitted rows
     pub raw: Mat<f64>,
-    /// `S = ZᵀRZ`
+    /// `Λ_e = ZᵀΠZ`
     pub s: Mat<f64>,
     /// `b = ZᵀRr`
     pub b: Vec<f64>,
 }
 
 impl Projected {
-    /// `ηᵀSη` and `ηᵀZᵀZη`: energy of the effect that is left, and all of it.
+    /// `ηᵀ Λ_e η` and `ηᵀZᵀZη`: energy of the effect that is left, and all of it.
     pub fn energy(&self, eta: &[f64]) -> (f64, f64) {
         let k = self.z.len().min(eta.len());
         let quad = |m: &Mat<f64>| -> f64 {
@@ -68,7 +68,7 @@ impl Projected {
 /// A fit of a set of effects.
 #[derive(Debug, Clone, Default)]
 pub struct Fit {
-    /// by how much `J` falls
+    /// by how much `χ²` falls
     pub gain: f64,
     /// coefficients of all columns, set after set
     pub eta: Vec<f64>,
@@ -111,7 +111,7 @@ pub struct Evidence<'a> {
     pub r: Vec<Vec<f64>>,
     /// `Qᵀ r` over fitted rows
     d: Vec<f64>,
-    /// `J` of the nominal model refitted under its prior
+    /// `χ²` of the nominal model refitted under its prior
     pub j0: f64,
     /// deviations of the prior in use
     pub spread: Vec<f64>,
@@ -337,7 +337,7 @@ impl<'a> Evidence<'a> {
             .collect()
     }
 
-    /// `Z₁ᵀ R Z₂`.
+    /// `Z₁ᵀ Π Z₂`.
     pub fn cross(&self, a: &Projected, b: &Projected) -> Mat<f64> {
         Mat::from_fn(a.z.len(), b.z.len(), |i, k| {
             let absorbed: f64 = (0..self.d.len()).map(|r| a.c[(r, i)] * b.c[(r, k)]).sum();

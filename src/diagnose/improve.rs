@@ -2,13 +2,13 @@
 //!
 //! The parameters fitted beside the effects need not be those of bodies that can exist: the records leave
 //! many of them free within the prior. Of all that can, the nearest are taken in the metric of the
-//! information `A = WᵀW + P⁻¹`, in which what the records do not see costs nothing,
+//! information `Λ = WᵀW + P⁻¹`, in which what the records do not see costs nothing,
 //!
 //! ```text
-//! minimise over φ   ½ (φ − φ̂)ᵀ A (φ − φ̂) + D(φ ‖ φ₀)
+//! minimise over φ   ½ (φ − φ̂)ᵀ Λ (φ − φ̂) + d(φ ‖ φ₀)
 //! ```
 //!
-//! with the entropic distance `D` of [`consistent`], the barrier that keeps
+//! with the entropic distance `d` of [`consistent`], the barrier that keeps
 //! every body inside.
 
 use super::catalogue::{Context, Effect, Estimate};

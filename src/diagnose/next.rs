@@ -1,10 +1,10 @@
 //! What to run next: the motion that tells two effects apart, or that shows one.
 //!
 //! Two effects look alike where their projected columns point the same way. With the effect `A` that is
-//! believed, `a = R^½ Z_A η_A`, and the columns `B` of its rival, the share of `A` that `B` can imitate is
+//! believed, `a = Π^½ Z_A η_A`, and the columns `B` of its rival, the share of `A` that `B` can imitate is
 //!
 //! ```text
-//! overlap = bᵀ S_B⁻¹ b / aᵀa,   b = Z_Bᵀ R Z_A η_A
+//! overlap = bᵀ Λ_B⁻¹ b / aᵀa,   b = Z_Bᵀ Π Z_A η_A
 //! ```
 //!
 //! The distinguishable part, `(1 − overlap) aᵀa`, is the non-centrality of the test between the two:

@@ -17,7 +17,7 @@ pub struct Candidate {
     pub shape: Shape,
     /// columns
     pub projected: Projected,
-    /// by how much `J` falls when it is added to what is already there
+    /// by how much `χ²` falls when it is added to what is already there
     pub gain: f64,
     /// coefficients then
     pub eta: Vec<f64>,

@@ -1,15 +1,15 @@
 //! Parameters that a robot can have, as near to the data as to the prior.
 //!
 //! ```text
-//! minimise over φ   ½ (P φ − π̂)ᵀ Λ (P φ − π̂) + γ D(φ ‖ φ₀)
+//! minimise over φ   ½ (T_b φ − π̂)ᵀ Λ (T_b φ − π̂) + γ d(φ ‖ φ₀)
 //! ```
 //!
-//! with `π = P φ` the base parameters, `π̂` and `Λ` their estimate and information, and the Bregman
+//! with `π_b = T_b φ` the base parameters, `π̂` and `Λ` their estimate and information, and the Bregman
 //! divergence of the log-determinant, the entropic distance between bodies (Lee, Wensing & Park 2020;
 //! Wensing, Kim & Slotine 2018),
 //!
 //! ```text
-//! D = Σ_bodies [ tr(J₀⁻¹J) − ln det(J₀⁻¹J) − 4 ] + Σ_terms [ x/x₀ − ln(x/x₀) − 1 ]
+//! d = Σ_bodies [ tr(J₀⁻¹J) − ln det(J₀⁻¹J) − 4 ] + Σ_terms [ x/x₀ − ln(x/x₀) − 1 ]
 //! ```
 //!
 //! of pseudo-inertia matrices `J` (4×4), armature, viscous and Coulomb friction. It does not depend on

@@ -107,7 +107,7 @@ fn root(h: &Mat<f64>) -> Result<Mat<f64>> {
     Ok(Mat::from_fn(p, p, |i, j| l[(j, i)] * s[j]))
 }
 
-/// `P`: `π = P φ`.
+/// `T_b`: `π_b = T_b φ`.
 fn projection(base: &BaseParameters) -> Mat<f64> {
     let mut p = Mat::zeros(base.count(), base.names.len());
     for a in 0..base.count() {

@@ -1,16 +1,16 @@
 //! Covariance of base parameters when residuals are correlated in time.
 //!
 //! Filtering makes neighbouring residuals alike, and so does everything that the model lacks. With
-//! `A = Σ W̃ᵀW̃` of the weighted rows the estimate has the covariance
+//! `Λ = Σ W̃ᵀW̃` of the weighted rows the estimate has the covariance
 //!
 //! ```text
-//! C = A⁻¹ M A⁻¹,     M = Σ_a (1/m) Σ_f S_a(f) w̃_a(f)ᴴ w̃_a(f)
+//! C = Λ⁻¹ B Λ⁻¹,     B = Σ_a (1/m) Σ_f S_a(f) w̃_a(f)ᴴ w̃_a(f)
 //! ```
 //!
 //! where `w̃_a(f)` is the discrete Fourier transform of the weighted rows of channel `a` and `S_a` the
 //! spectrum of its residual, smoothed over neighbouring frequencies. This is the sandwich of Newey &
 //! West (1987) with the lag window replaced by its spectral counterpart and the residual taken as
-//! stationary, which halves its small-sample bias; for white residuals of unit variance `M = A`.
+//! stationary, which halves its small-sample bias; for white residuals of unit variance `B = Λ`.
 
 use super::linear::{self, Weights, inverse_information, weighted};
 use super::stack::Stack;
@@ -25,7 +25,7 @@ use rayon::prelude::*;
 pub struct Covariance {
     /// `b × b`
     pub matrix: Mat<f64>,
-    /// `tr(A⁻¹M)/b`: variance relative to white unit residuals
+    /// `tr(Λ⁻¹B)/b`: variance relative to white unit residuals
     pub inflation: f64,
 }
 

@@ -4,12 +4,12 @@
 //! platform), the torques of a loaded robot are
 //!
 //! ```text
-//! τ = τ_model + Z Δ + Y_t φ_l + F_c,j sign(q̇_j) + F_v,j q̇_j + o_j        loaded records
-//! τ = τ_model + Z Δ            + F_c,j sign(q̇_j) + F_v,j q̇_j + o_j        unloaded records
+//! τ = τ_model + W δ + Y_t φ_l + F_c,j sign(q̇_j) + F_v,j q̇_j + o_j        loaded records
+//! τ = τ_model + W δ            + F_c,j sign(q̇_j) + F_v,j q̇_j + o_j        unloaded records
 //! ```
 //!
 //! * `τ_model`: the nominal model without the friction of the actuated joints;
-//! * `Δ`: what the unloaded robot deviates from it, estimated where there are unloaded records
+//! * `W δ`: what the unloaded robot deviates from it, estimated where there are unloaded records
 //!   (base parameters of a serial robot, the platform of a parallel one);
 //! * friction: refitted for every record, because it changes with load and temperature.
 //!
@@ -21,8 +21,8 @@
 //! ```
 //!
 //! fitted to the residuals, so that what is left of stick-slip friction near standstill does not
-//! count. For a parallel robot that is the same as a fit of the platform's wrench `w = Jᵀ f` with the
-//! weight `(Jᵀ diag(σ²) J)⁻¹`: the transformation is regular. The parameters are linear in the
+//! count. For a parallel robot that is the same as a fit of the platform's wrench `w = D_aᵀ f` with the
+//! weight `(D_aᵀ diag(σ²) D_a)⁻¹`: the transformation is regular. The parameters are linear in the
 //! forces, so noise of the forces does not bias them, unlike the form in `1/m` of [`two_step`], the
 //! published estimator of Schulte & Gerland for platforms, which is reported beside it.
 

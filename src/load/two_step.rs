@@ -1,14 +1,14 @@
 //! The published two-step estimator for platforms: Schulte & Gerland, *A systematic load
 //! identification procedure for parallel robot manipulators*.
 //!
-//! With `F, M` the force and the moment about the platform's origin `P` that the legs exert on the
-//! platform (the inertia of the legs subtracted), `A` the orientation of the platform and
-//! `Ω = ω̃ω̃ + ω̇̃` in platform axes, Newton's equation `m (a_P + A Ω r) = F + m g` gives step 1,
+//! With `f, μ` the force and the moment about the platform's origin `O` that the legs exert on the
+//! platform (the inertia of the legs subtracted), `R` the orientation of the platform and
+//! `Ω = ω̃ω̃ + ω̇̃` in platform axes, Newton's equation `m (a_O + R Ω c) = f + m g` gives step 1,
 //! Euler's about the centre of mass step 2:
 //!
 //! ```text
-//! y₁ = a_P − g              Φ₁ = [ F | −A Ω ]           θ₁ = [1/m, r]
-//! y₂ = Aᵀ M − r × Aᵀ F      Φ₂ = L(ω̇) + ω̃ L(ω)          θ₂ = [Jxx, Jxy, Jxz, Jyy, Jyz, Jzz]
+//! y₁ = a_O − g              X₁ = [ f | −R Ω ]           θ₁ = [1/m, c]
+//! y₂ = Rᵀ μ − c × Rᵀ f      X₂ = L(ω̇) + ω̃ L(ω)          θ₂ = [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]
 //! ```
 //!
 //! The printed equations (3) and (4) have the signs of a `z` axis that points down and of the force
@@ -17,9 +17,9 @@
 //! `w = 1 − exp(−(v̄/v₀)⁴)` (the paper does not print its own), after Coulomb and viscous friction
 //! were taken off the forces.
 //!
-//! **What is known of its errors.** The first column of `Φ₁` holds the measured force, so its noise
-//! makes `1/m` too small: `m̂/m − 1 ≈ tr(Cov F) / mean |F|²`. Step 1 does not use the moments, which
-//! carry the centre of mass; and an error of `r` goes into `J`. Therefore [`one_step`](super::one_step)
+//! **What is known of its errors.** The first column of `X₁` holds the measured force, so its noise
+//! makes `1/m` too small: `m̂/m − 1 ≈ tr(Cov f) / mean |f|²`. Step 1 does not use the moments, which
+//! carry the centre of mass; and an error of `c` goes into the tensor. Therefore [`one_step`](super::one_step)
 //! is the default.
 
 use super::body::{LoadBody, Quantities, difference, from_quantities};
@@ -42,24 +42,24 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 /// Motion of a platform and the force on it, in one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlatformSample {
-    /// `A`: turns platform axes into base axes
+    /// `R`: turns platform axes into base axes
     pub rotation: Matrix3<f64>,
     /// `ω`, platform axes, rad/s
     pub omega: Vector3<f64>,
     /// `ω̇`, platform axes, rad/s²
     pub alpha: Vector3<f64>,
-    /// `a_P`, base axes, without gravity, m/s²
+    /// `a_O`, base axes, without gravity, m/s²
     pub acceleration: Vector3<f64>,
-    /// `F`, base axes, N
+    /// `f`, base axes, N
     pub force: Vector3<f64>,
-    /// `M` about `P`, base axes, N m
+    /// `μ` about `O`, base axes, N m
     pub moment: Vector3<f64>,
     /// weight
     pub weight: f64,
 }
 
 impl PlatformSample {
-    /// `Φ₁` and `y₁`: Newton's equation, linear in `[1/m, r]`; base axes, m/s².
+    /// `X₁` and `y₁`: Newton's equation, linear in `[1/m, r]`; base axes, m/s².
     pub fn newton(&self, gravity: &Vector3<f64>) -> (SMatrix<f64, 3, 4>, Vector3<f64>) {
         let turning = skew(&self.omega) * skew(&self.omega) + skew(&self.alpha);
         let mut left = SMatrix::<f64, 3, 4>::zeros();
@@ -69,7 +69,7 @@ impl PlatformSample {
         (left, self.acceleration - gravity)
     }
 
-    /// `Φ₂` and `y₂`: Euler's equation about the centre of mass `r`, linear in the tensor; platform
+    /// `X₂` and `y₂`: Euler's equation about the centre of mass `r`, linear in the tensor; platform
     /// axes, N m.
     pub fn euler(&self, r: &Vector3<f64>) -> (SMatrix<f64, 3, 6>, Vector3<f64>) {
         let back = self.rotation.transpose();
@@ -258,7 +258,7 @@ pub fn estimate(
     })
 }
 
-/// Covariance of the ten parameters about `P`, to first order from those of the two steps.
+/// Covariance of the ten parameters about `O`, to first order from those of the two steps.
 fn covariance(t: &Total) -> Mat<f64> {
     let at = |v: &[f64; 10]| -> [f64; 10] {
         let mut q = *v;

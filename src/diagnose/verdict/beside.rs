@@ -20,7 +20,7 @@ pub struct Beside<'a> {
     pub with: Fit,
     /// residual without the member and with it
     pub residual: [Vec<Vec<f64>>; 2],
-    /// by how much `J` falls through the member
+    /// by how much `χ²` falls through the member
     pub gain: f64,
     /// by how much the penalty of the prior falls
     pub fall: f64,

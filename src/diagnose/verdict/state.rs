@@ -46,7 +46,7 @@ impl<'a> State<'a> {
 }
 
 impl State<'_> {
-    /// By how much `J` falls with a set.
+    /// By how much `χ²` falls with a set.
     pub fn gain(&self, set: &[Candidate]) -> f64 {
         let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
         self.evidence.fit(&set).gain
