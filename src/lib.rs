@@ -40,6 +40,7 @@
 //! | rehearsal | [`simulate`] | a log as the robot would write it |
 //! | log | [`log`], [`signals`] | what was recorded, repaired, filtered, differentiated |
 //! | identify | [`identify`] | parameters with their uncertainty, validated on other records |
+//! | export | [`export`] | identified and improved robots as URDF, MuJoCo XML, `robot.toml` |
 //! | load | [`load`] | mass, centre of mass and inertia of what the robot carries |
 //! | diagnose | [`diagnose`] | which effect the model lacks, and how far the gap shrinks with it |
 //! | report | [`report`] | pages, tables and plots of all stages |

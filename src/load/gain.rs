@@ -5,10 +5,10 @@
 //! robot with a **known** load `φ_k` (Gautier & Briot 2014),
 //!
 //! ```text
-//! τ_j = k_j (τ_model + Z Δ [+ Y_t φ_k] + friction)_j
+//! τ_j = k_j (τ_model + W δ [+ Y_t φ_k] + friction)_j
 //! ```
 //!
-//! is solved for `k`, `Δ` and friction by Gauss-Newton. The errors stay with the measured torques, so
+//! is solved for `k`, `δ` and friction by Gauss-Newton. The errors stay with the measured torques, so
 //! that the small difference that the load makes is not attenuated, which least squares in
 //! `τ_j / k_j` would do.
 

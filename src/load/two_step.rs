@@ -339,7 +339,7 @@ fn platform_samples(
     ))
 }
 
-/// Wrench on the platform from forces of the actuators (actuator-major, friction taken off): `Jᵀ f`
+/// Wrench on the platform from forces of the actuators (actuator-major, friction taken off): `D_aᵀ f`
 /// minus what moves the legs.
 ///
 /// # Errors
