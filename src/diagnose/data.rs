@@ -10,7 +10,7 @@ use super::rigid::{inertia, rigid};
 use super::window::{averaged, fine, sign};
 use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::plant::{Kind, Parameter, Plant};
+use crate::plant::{self, Parameter, Plant};
 use crate::robot::JointTerm;
 use crate::signals::series::Series;
 use faer::Mat;
@@ -215,7 +215,7 @@ impl<'a> Data<'a> {
     fn coulomb(&mut self) {
         let actuated = self.plant.actuated();
         for c in 0..self.parameters.len() {
-            let Kind::Term {
+            let plant::Column::Term {
                 joint,
                 term: JointTerm::Coulomb,
             } = self.parameters[c].kind
@@ -356,7 +356,7 @@ impl<'a> Data<'a> {
                 unit: "",
                 value: 0.0,
                 // not an unknown of the nominal model
-                kind: Kind::Nuisance,
+                kind: plant::Column::Nuisance,
                 raw: Vec::new(),
             });
             self.spread.push(*spread);
@@ -380,8 +380,8 @@ impl<'a> Data<'a> {
             .iter()
             .zip(phi)
             .map(|(p, v)| match p.kind {
-                Kind::Inertial { .. } => *v,
-                Kind::Term { .. } | Kind::Nuisance => 0.0,
+                plant::Column::Inertial { .. } => *v,
+                plant::Column::Term { .. } | plant::Column::Nuisance => 0.0,
             })
             .collect();
         let mut torque: Vec<Vec<f64>> = (0..self.joints())

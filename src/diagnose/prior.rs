@@ -1,7 +1,7 @@
 //! How far the parameters of a nominal model may be off: what is ordinary for a model of its origin.
 
 use super::noise::Noise;
-use crate::plant::{Kind, Parameter, Plant};
+use crate::plant::{self, Parameter, Plant};
 use crate::robot::{JointTerm, Prior};
 
 /// Factors on the deviations of the prior: of masses, first moments and rotors, and of tensors.
@@ -9,13 +9,13 @@ pub type Closeness = [f64; 2];
 
 /// Factor of every parameter of the nominal model.
 pub fn factors(parameters: &[Parameter], closeness: Closeness) -> Vec<f64> {
-    let of = |kind: &Kind| match kind {
-        Kind::Inertial { k, .. } => closeness[usize::from(*k > 3)],
-        Kind::Term {
+    let of = |kind: &plant::Column| match kind {
+        plant::Column::Inertial { k, .. } => closeness[usize::from(*k > 3)],
+        plant::Column::Term {
             term: JointTerm::Armature,
             ..
         } => closeness[0],
-        Kind::Term { .. } | Kind::Nuisance => 1.0,
+        plant::Column::Term { .. } | plant::Column::Nuisance => 1.0,
     };
     parameters.iter().map(|p| of(&p.kind)).collect()
 }
@@ -47,7 +47,7 @@ pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &
     parameters
         .iter()
         .map(|p| match p.kind {
-            Kind::Inertial { body, k } => {
+            plant::Column::Inertial { body, k } => {
                 let m = robot.bodies[body]
                     .inertia
                     .mass()
@@ -64,7 +64,7 @@ pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &
                     _ => second * m * l * l,
                 }
             }
-            Kind::Term { joint, term } => {
+            plant::Column::Term { joint, term } => {
                 let terms = robot.joints[joint].terms;
                 let value = p.value.abs();
                 let j = actuated.iter().position(|a| *a == joint);
@@ -84,7 +84,7 @@ pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &
                 .max(0.02 * noise)
             }
             // each states its own
-            Kind::Nuisance => 0.0,
+            plant::Column::Nuisance => 0.0,
         })
         .collect()
 }

@@ -19,7 +19,7 @@ mod noise;
 mod torque;
 mod values;
 
-pub use crate::robot::{Column, Column as Kind, Parameter};
+pub use crate::robot::{Column, Parameter};
 pub use certify::Certified;
 pub use follow::Rates;
 pub use noise::DEFAULT_NOISE;

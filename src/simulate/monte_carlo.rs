@@ -12,7 +12,7 @@ use super::{Run, Settings};
 use crate::base::BaseParameters;
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
-use crate::plant::{Kind, Plant};
+use crate::plant::{Column, Plant};
 use crate::trajectory::Fourier;
 use faer::linalg::solvers::{Solve, SolveLstsq};
 use faer::{Mat, Side};
@@ -53,10 +53,10 @@ pub struct MonteCarlo {
 pub fn true_parameters(plant: &Plant, settings: &Settings) -> Vec<f64> {
     let phi = settings.effects.inertia(plant, settings.seed);
     let terms = settings.effects.terms(plant, settings.seed);
-    let one = |kind: Kind| match kind {
-        Kind::Inertial { body, k } => phi[10 * body + k],
-        Kind::Term { joint, term } => terms[joint][term as usize],
-        Kind::Nuisance => 0.0,
+    let one = |kind: Column| match kind {
+        Column::Inertial { body, k } => phi[10 * body + k],
+        Column::Term { joint, term } => terms[joint][term as usize],
+        Column::Nuisance => 0.0,
     };
     plant.parameters().iter().map(|p| one(p.kind)).collect()
 }

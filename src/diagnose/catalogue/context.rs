@@ -7,7 +7,7 @@ use crate::diagnose::data::Data;
 use crate::diagnose::window::{averaged, sign};
 use crate::dynamics::Samples;
 use crate::mechanism::MechanismMotion;
-use crate::plant::Kind;
+use crate::plant;
 use crate::robot::{JointTerm, Motion};
 use crate::signals::series::Series;
 use std::sync::OnceLock;
@@ -97,7 +97,7 @@ impl<'a> Context<'a> {
                     .data
                     .parameters
                     .iter()
-                    .any(|p| p.kind == Kind::Term { joint, term })
+                    .any(|p| p.kind == plant::Column::Term { joint, term })
             })
             .collect()
     }

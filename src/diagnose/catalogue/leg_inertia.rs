@@ -94,7 +94,7 @@ fn unknowns(cx: &Context) -> Vec<Unknown> {
         cx.data
             .parameters
             .iter()
-            .any(|p| matches!(p.kind, Kind::Inertial { body: b, .. } if b == body))
+            .any(|p| matches!(p.kind, plant::Column::Inertial { body: b, .. } if b == body))
     };
     let bodies = &mechanism.robot.bodies;
     let of = |kind: &str| -> Vec<usize> {

@@ -130,7 +130,7 @@ fn in_proportion(cx: &Context, body: usize) -> Option<Column> {
 pub(crate) fn body_columns(cx: &Context, body: usize, count: usize) -> Vec<Column> {
     (0..count)
         .filter_map(|k| {
-            let kind = Kind::Inertial { body, k };
+            let kind = plant::Column::Inertial { body, k };
             let c = cx.data.parameters.iter().position(|p| p.kind == kind)?;
             let rows = (0..cx.data.joints())
                 .map(|j| (j, cx.data.w[j].col(c).iter().copied().collect()))

@@ -46,7 +46,7 @@ pub use estimate::{Estimate, Place, Quantity, Shape, Value};
 use super::column::Column;
 use crate::dynamics::Samples;
 use crate::export::Part;
-use crate::plant::Kind;
+use crate::plant;
 use crate::robot::{Inertia, JointTerm, Motion, Robot};
 use crate::signals::series::Series;
 use context::{closed_column, ladder, projected, prune, smooth};
