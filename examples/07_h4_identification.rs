@@ -8,8 +8,7 @@ use excite::design::{Condition, Settings as Design, design};
 use excite::identify::{Settings, identify};
 use excite::log::{Purpose, Record};
 use excite::mechanism::{Mechanism, bundled};
-use excite::simulate::record::{Sensors, measure, to_record};
-use excite::simulate::{Run, Settings as Simulation, simulate};
+use excite::simulate::{Run, Sensors, Settings as Simulation, measure, simulate, to_record};
 use excite::trajectory::Ends;
 use excite::{Plant, Result};
 

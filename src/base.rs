@@ -13,7 +13,7 @@
 //! **The rank** `b` is counted on the singular values of `W` as it is, in kg, m and rad. Columns
 //! scaled to unit length would hide the border: a column that is almost nothing becomes as large
 //! as the others. The geometry is the one that the file means, without the rounding of its digits
-//! ([`meant`](crate::robot::meant)), and the states are inside the limits of position and equally
+//! (the file `robot/meant.rs`), and the states are inside the limits of position and equally
 //! fast for all joints, so that no limit decides. What is left is a plain gap: values that count
 //! may fall smoothly to 1e-7 of the largest (fingers that follow one motor), the others are
 //! rounding of the arithmetic, 1e-15. The border is the first gap of a factor [`CLEAR`] that ends
@@ -42,10 +42,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Factor between two neighbouring singular values that makes a border of the rank.
+#[doc(hidden)]
 pub const CLEAR: f64 = 1e3;
 
 /// Largest singular value below the border, relative to the largest of all: what is more is never
 /// dropped at the first gap.
+#[doc(hidden)]
 pub const NEGLIGIBLE: f64 = 1e-6;
 
 /// Rounding of the arithmetic, relative to the largest singular value.

@@ -43,7 +43,6 @@
 //! | export | [`export`] | identified and improved robots as URDF, MuJoCo XML, `robot.toml` |
 //! | load | [`load`] | mass, centre of mass and inertia of what the robot carries |
 //! | diagnose | [`diagnose`] | which effect the model lacks, and how far the gap shrinks with it |
-//! | report | [`report`] | pages, tables and plots of all stages |
 //! | documents | [`documentation`] | method, notation, files: the folder `docs/` |
 //!
 //! | symbol | meaning |
@@ -58,22 +57,28 @@
 //! equations in [`documentation::method`].
 #![warn(missing_docs)]
 
+// Modules and names under `#[doc(hidden)]` are internals that the program, the tests and the benchmarks use. They may
+// change at any time.
+
 pub mod base;
+#[doc(hidden)]
 pub mod conic;
 pub mod design;
 pub mod diagnose;
 pub mod documentation;
 pub mod dynamics;
-pub mod error;
+mod error;
 pub mod export;
 pub mod identifiability;
 pub mod identify;
 pub mod load;
 pub mod log;
 pub mod mechanism;
+#[doc(hidden)]
 pub mod output;
 pub mod plant;
 pub mod regressor;
+#[doc(hidden)]
 pub mod report;
 pub mod robot;
 pub mod signals;

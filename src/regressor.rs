@@ -19,6 +19,7 @@ pub struct Regressor {
 }
 
 /// Factor of a joint column in the torque of its joint: `q̈`, `q̇`, `sign(q̇)`, `1`.
+#[doc(hidden)]
 pub fn term_factor(term: JointTerm, [_, qd, qdd]: [f64; 3]) -> f64 {
     match term {
         JointTerm::Armature => qdd,
@@ -83,6 +84,7 @@ impl Regressor {
 ///
 /// # Panics
 /// If the motion is of another robot.
+#[doc(hidden)]
 pub fn nominal_torque(robot: &Robot, tree: &Tree, motion: &Samples) -> Vec<f64> {
     let mut tau = vec![0.0; motion.dof * motion.count];
     let phi: Vec<f64> = robot.bodies.iter().flat_map(|b| b.inertia.0).collect();
@@ -97,6 +99,7 @@ pub fn nominal_torque(robot: &Robot, tree: &Tree, motion: &Samples) -> Vec<f64> 
 
 /// The nominal torque of one state as a function, for
 /// [`write_samples`](crate::trajectory::samples::write_samples) and the like.
+#[doc(hidden)]
 pub fn torque_function<'a>(
     robot: &'a Robot,
     tree: &'a Tree,
@@ -105,6 +108,7 @@ pub fn torque_function<'a>(
 }
 
 /// The part of it that has derivatives: all but Coulomb friction.
+#[doc(hidden)]
 pub fn smooth_torque_function<'a>(
     robot: &'a Robot,
     tree: &'a Tree,
@@ -139,6 +143,7 @@ fn state_torque<'a>(
 }
 
 /// Sum of the joint terms of the nominal model: armature, friction, offset.
+#[doc(hidden)]
 pub fn joint_torque(joint: &Joint, state: [f64; 3]) -> f64 {
     JointTerm::ALL
         .into_iter()

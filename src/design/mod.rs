@@ -8,25 +8,29 @@
 //!
 //! with `q(t; x)` a Fourier series whose end conditions are built in ([`Basis`]). The problem is
 //! not convex, so [`design`] runs many starts in rounds: eight random ones are each improved by
-//! convex programs ([`solve`]), the best three of them are followed to the end, and later rounds
+//! convex programs (`solve`), the best three of them are followed to the end, and later rounds
 //! also start from disturbed copies of the best so far. Each start has its own stream of random
 //! numbers and rounds are compared in a fixed order, so the result is the same for the same seed
 //! whatever the number of threads, unless a time limit ends the run.
 
+#[doc(hidden)]
 pub mod criterion;
+#[doc(hidden)]
 pub mod diagnostic;
+#[doc(hidden)]
 pub mod information;
-pub mod limits;
+pub(crate) mod limits;
 mod mechanism_limits;
-pub mod path;
+pub(crate) mod path;
 mod problem;
+#[doc(hidden)]
 pub mod record;
 mod result;
 mod rounds;
-pub mod settings;
-pub mod solve;
-pub mod start;
-pub mod torque;
+pub(crate) mod settings;
+pub(crate) mod solve;
+pub(crate) mod start;
+pub(crate) mod torque;
 
 pub use criterion::{Condition, Criterion};
 pub use record::{Record, Status};

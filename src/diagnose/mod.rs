@@ -7,53 +7,65 @@
 //!
 //! | step | module | what it gives |
 //! |---|---|---|
-//! | records | [`Series`], [`noise`], [`window`] | motion and derivatives, noise floor, whitening |
-//! | prior | [`prior`], [`closeness`] | how far a model may be off, how close an identified one is |
-//! | loads | [`payload`] | what the robot carried: known, unknown or nothing |
-//! | nominal | [`data`], [`rigid`], [`evidence`] | what the nominal model absorbs, at the price of its prior |
+//! | records | `Series`, `noise`, `window` | motion and derivatives, noise floor, whitening |
+//! | prior | `prior`, `closeness` | how far a model may be off, how close an identified one is |
+//! | loads | `payload` | what the robot carried: known, unknown or nothing |
+//! | nominal | `data`, `rigid`, [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
-//! | search | [`search`], [`verdict`] | sets of effects, rivals, confidence |
+//! | search | `search`, `verdict` | sets of effects, rivals, confidence |
 //! | constants | [`thresholds`] | what the verdict rests on, with units and origin |
-//! | intervals | [`interval`] | how sure the share is that an effect explains |
-//! | gap | [`gap`] | residuals against noise: joints, odd, even, non-periodic |
-//! | simulation | [`forward`], [`controller`] | the robot simulated under the same commands, before and after |
+//! | intervals | `interval` | how sure the share is that an effect explains |
+//! | gap | `gap` | residuals against noise: joints, odd, even, non-periodic |
+//! | simulation | `forward`, [`controller`] | the robot simulated under the same commands, before and after |
 //! | next | [`next`] | the motion that tells rivals apart |
-//! | output | [`finding`], [`result`], [`traces`], [`json`], [`page`], [`improve`] | `diagnosis.json`, report, improved robot |
+//! | output | `finding`, `result`, `traces`, [`json`], [`page`], `improve` | `diagnosis.json`, report, improved robot |
 //!
 //! The method with its equations is in `docs/diagnosis-method.md`.
 
+#[doc(hidden)]
 pub mod catalogue;
-pub mod closeness;
-pub mod column;
+pub(crate) mod closeness;
+pub(crate) mod column;
+#[doc(hidden)]
 pub mod controller;
-pub mod data;
-pub mod decoy;
+pub(crate) mod data;
+pub(crate) mod decoy;
+#[doc(hidden)]
 pub mod evidence;
-pub mod finding;
-pub mod forward;
-pub mod gap;
-pub mod improve;
-pub mod interval;
+pub(crate) mod finding;
+pub(crate) mod forward;
+pub(crate) mod gap;
+pub(crate) mod improve;
+pub(crate) mod interval;
+#[doc(hidden)]
 pub mod json;
+#[doc(hidden)]
 pub mod next;
-pub mod noise;
+pub(crate) mod noise;
 mod noise_floor;
+#[doc(hidden)]
 pub mod page;
-pub mod payload;
-pub mod prior;
-pub mod result;
+pub(crate) mod payload;
+pub(crate) mod prior;
+pub(crate) mod result;
 mod reversal;
-pub mod rigid;
-pub mod search;
-pub mod settings;
+pub(crate) mod rigid;
+pub(crate) mod search;
+pub(crate) mod settings;
+#[doc(hidden)]
 pub mod thresholds;
-pub mod traces;
-pub mod verdict;
-pub mod window;
+pub(crate) mod traces;
+pub(crate) mod verdict;
+pub(crate) mod window;
 
+pub use catalogue::{Place, Shape, Value};
 pub use finding::Finding;
+pub use gap::JointGap;
+pub use improve::Improved;
+pub use next::Proposal;
 pub use result::{Diagnosis, RecordGap};
 pub use settings::Settings;
+#[doc(hidden)]
 pub use traces::Trace;
 pub use verdict::Verdict;
 
@@ -66,6 +78,7 @@ use data::Data;
 use evidence::Evidence;
 use rayon::prelude::*;
 
+#[doc(hidden)]
 /// Records ready for the diagnosis: noise, window of the torque channel, ordinary imperfections.
 ///
 /// # Errors

@@ -20,7 +20,6 @@ mod rivals;
 mod state;
 
 pub use judge::Member;
-pub use rivals::Rival;
 pub(super) use state::inflation;
 
 use super::catalogue::{Context, Effect};
@@ -50,12 +49,6 @@ pub struct Decision {
     pub verdict: Verdict,
     /// effects by falling confidence
     pub members: Vec<Member>,
-    /// fit of all of them together
-    pub fit: Fit,
-    /// gap energy of the refitted nominal model on fitted records, by actuator, noise variances
-    pub before: Vec<f64>,
-    /// the same with the set
-    pub after: Vec<f64>,
     /// gap energy on holdout records before and after
     pub holdout: [f64; 2],
     /// what the prior says against the refitted parameters, before and after
@@ -124,9 +117,6 @@ pub fn decide(
     Decision {
         verdict,
         members,
-        fit,
-        before,
-        after,
         holdout: [base_held, st.above(&hold_after, false)],
         surprise: [surprise, surprise_after],
         unexplained,

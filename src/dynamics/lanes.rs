@@ -412,11 +412,8 @@ pub(crate) fn sym_mul<L: Lanes>(s: &[f64; 6], x: V3<L>) -> V3<L> {
     ]
 }
 
-/// Largest argument that [`sin_cos`] reduces accurately.
-pub const SIN_COS_RANGE: f64 = 1e5;
-
 /// Sine and cosine of every lane, within 2 units in the last place of 1 for
-/// `|x| ≤` [`SIN_COS_RANGE`].
+/// `|x| ≤ 1e5`.
 ///
 /// `x = k π/2 + r`, `|r| ≤ π/4` by a three-part π/2 (Cody & Waite), Taylor series of `r`
 /// (remainder below 1e-18), and a quarter-turn by the integers `sin(kπ/2)`, `cos(kπ/2)` written as
@@ -471,6 +468,9 @@ pub fn sin_cos<L: Lanes>(x: L) -> (L, L) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Largest argument that [`sin_cos`] reduces accurately.
+    const SIN_COS_RANGE: f64 = 1e5;
 
     #[test]
     fn sin_cos_is_accurate_to_two_ulp_of_one() {

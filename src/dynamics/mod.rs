@@ -17,9 +17,10 @@
 //! ```
 
 mod kernel;
-pub mod lanes;
+pub(crate) mod lanes;
 mod tree;
 
+#[doc(hidden)]
 pub use lanes::Isa;
 pub use tree::Tree;
 
@@ -376,7 +377,7 @@ impl Job for GradientJob<'_> {
 impl Tree {
     /// Rigid-body regressor of all samples, stacked joint-major: entry of coordinate `j`, sample
     /// `i`, column `c` at `w[c * stride + j * count + i]` with `count` the samples of the motion.
-    /// Columns `10·body + k`, see [`inertia`](crate::robot::inertia).
+    /// Columns `10·body + k`, see `inertia`.
     ///
     /// `Y_ij φ_j = v_ij·f_j + w_ij·n_j` (Atkeson, An & Hollerbach 1986, eq. 10-14).
     /// Blocks of coordinates that do not move a body are zero by structure and are **not

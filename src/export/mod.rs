@@ -3,19 +3,22 @@
 //! | file | module | holds | robots |
 //! |---|---|---|---|
 //! | `robot.urdf` | [`urdf`] | tree, inertia, limits, viscous and Coulomb friction | all |
-//! | `robot.xml` | [`mujoco`] | the same for MuJoCo, rotor inertia, gravity | serial |
-//! | `robot.toml` | [`robot_toml`], [`mechanism`] | what the other commands read, geometry and loops included | all |
+//! | `robot.xml` | `mujoco` | the same for MuJoCo, rotor inertia, gravity | serial |
+//! | `robot.toml` | `robot_toml`, [`mechanism`] | what the other commands read, geometry and loops included | all |
 //!
 //! A new format is one file with an implementation of [`Format`], and one line in [`FORMATS`]. What a model
 //! has and a format cannot hold stands in it as a comment ([`Remark`]). The bodies that are written can
 //! exist: masses are positive and principal moments fulfil the triangle inequality ([`possible`]).
 
+#[doc(hidden)]
 pub mod mechanism;
-pub mod mujoco;
-pub mod remark;
-pub mod robot_toml;
+pub(crate) mod mujoco;
+pub(crate) mod remark;
+pub(crate) mod robot_toml;
+#[doc(hidden)]
 pub mod urdf;
 
+#[doc(hidden)]
 pub use remark::Remark;
 
 use crate::error::{Result, Warning, WarningKind};
@@ -67,6 +70,7 @@ pub trait Format: Sync {
 }
 
 /// All formats.
+#[doc(hidden)]
 pub const FORMATS: [&dyn Format; 3] = [&urdf::Urdf, &mujoco::Mujoco, &robot_toml::RobotToml];
 
 /// Names of the files that a robot of this kind is written to.
@@ -99,6 +103,7 @@ impl Model<'_> {
 
 /// Bodies of a robot whose values are not those of a body that can exist. Bodies of which the plant
 /// knows a part of the ten parameters only stand for no body and are left out.
+#[doc(hidden)]
 pub fn impossible(plant: &Plant, robot: &Robot) -> Vec<usize> {
     let raw = plant.raw();
     let own = |b: usize, c: &Column| matches!(c, Column::Inertial { body, .. } if *body == b);
@@ -132,6 +137,7 @@ const ROUNDING: f64 = 1e-9;
 /// with the negative second moments about it raised to zero, where `Σ_c = ½ tr(I_c) 1 − I_c` (the
 /// triangle inequality of the principal moments is `Σ_c ⪰ 0`; Wensing, Kim & Slotine 2018). A body of
 /// negative mass becomes one of a milligram at its origin. One without mass stays as it is.
+#[doc(hidden)]
 pub fn possible(inertia: &Inertia) -> Inertia {
     if inertia.mass() < 0.0 {
         return bounded(

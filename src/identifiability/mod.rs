@@ -11,7 +11,9 @@
 //! (white noise, independent between samples and joints; Swevers et al. 1997, eq. 11), whose
 //! diagonal gives the predicted standard deviation of every base parameter.
 
+#[doc(hidden)]
 pub mod json;
+#[doc(hidden)]
 pub mod page;
 mod platform;
 
@@ -187,6 +189,7 @@ fn unexcited(condition: &ConditionNumbers, platform: bool) -> Option<Warning> {
     })
 }
 
+#[doc(hidden)]
 /// Condition numbers, non-zero singular values and `ln det` of the weighted information matrix.
 ///
 /// # Errors

@@ -29,8 +29,6 @@ use nalgebra::Matrix4;
 /// A body whose ten parameters are unknowns: its number and the unknown of each, where it has one.
 #[derive(Debug, Clone)]
 pub struct Body {
-    /// index into the robot's bodies
-    pub body: usize,
     /// name
     pub name: String,
     /// unknown that each of the ten parameters is
@@ -128,7 +126,6 @@ impl Prior {
             }
             unknowns.iter().flatten().for_each(|&u| taken[u] = true);
             prior.bodies.push(Body {
-                body,
                 name,
                 unknowns,
                 nominal,
@@ -325,10 +322,6 @@ fn definite(mut j: Matrix4<f64>) -> (Matrix4<f64>, bool) {
 pub struct Estimate {
     /// standard parameters
     pub phi: Vec<f64>,
-    /// Newton steps
-    pub iterations: usize,
-    /// Newton decrement at the end, squared and halved: how far the objective is from its minimum
-    pub gap: f64,
     /// Hessian of the whole at the minimum
     pub hessian: Mat<f64>,
 }
@@ -365,7 +358,6 @@ pub fn solve(
         }
     };
     let mut value = total(&phi);
-    let (mut iterations, mut gap) = (0, f64::INFINITY);
     let mut hessian = gram.clone();
     for _ in 0..200 {
         let mut g: Vec<f64> = (0..p)
@@ -386,7 +378,8 @@ pub fn solve(
         use faer::linalg::solvers::Solve;
         let x = factor.solve(Mat::from_fn(p, 1, |i, _| -g[i] / s[i]));
         let step: Vec<f64> = (0..p).map(|i| x[(i, 0)] / s[i]).collect();
-        gap = -0.5 * (0..p).map(|i| g[i] * step[i]).sum::<f64>();
+        // Newton decrement, squared and halved: how far the objective is from its minimum
+        let gap = -0.5 * (0..p).map(|i| g[i] * step[i]).sum::<f64>();
         if !gap.is_finite() {
             return Err(Error::Infeasible(
                 "the consistent estimate ran into numbers that are not finite".into(),
@@ -395,7 +388,6 @@ pub fn solve(
         if gap <= 1e-11 * (1.0 + 1e-3 * value.abs()) {
             break;
         }
-        iterations += 1;
         let mut t = 1.0;
         loop {
             let next: Vec<f64> = (0..p).map(|i| phi[i] + t * step[i]).collect();
@@ -407,19 +399,9 @@ pub fn solve(
             }
             t *= 0.5;
             if t < 1e-12 {
-                return Ok(Estimate {
-                    phi,
-                    iterations,
-                    gap,
-                    hessian,
-                });
+                return Ok(Estimate { phi, hessian });
             }
         }
     }
-    Ok(Estimate {
-        phi,
-        iterations,
-        gap,
-        hessian,
-    })
+    Ok(Estimate { phi, hessian })
 }

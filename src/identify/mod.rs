@@ -4,43 +4,47 @@
 //! records ─ signals ─▶ W_b, τ ─ method ─▶ π̂, Λ ─ prior, consistency ─▶ φ ─▶ report
 //! ```
 //!
-//! 1. [`equations`]: the filtered equations `W_b π = τ` of each record ([`stack`]).
-//!    Those of joints that stand still are left out of the fit ([`standstill`]).
-//! 2. [`method`]: base parameters `π̂` by the chosen [`Method`], from rows compressed by blocks
-//!    ([`linear`]). What follows another joint is fitted aside ([`aside`]).
-//! 3. [`normal`]: their information `Λ`, and their covariance with the residual's correlation in time
-//!    ([`uncertainty`]).
-//! 4. [`standard`]: standard parameters that a robot can have ([`consistent`], [`lmi`]); the strength of
-//!    the prior is chosen by [`cross_validation`] over contiguous parts of the fit records.
-//! 5. [`essential`]: the base parameters that matter.
-//! 6. [`validation`]: residuals on fit and holdout records.
+//! 1. `equations`: the filtered equations `W_b π = τ` of each record (`stack`).
+//!    Those of joints that stand still are left out of the fit (`standstill`).
+//! 2. `method`: base parameters `π̂` by the chosen [`Method`], from rows compressed by blocks
+//!    (`linear`). What follows another joint is fitted aside (`aside`).
+//! 3. `normal`: their information `Λ`, and their covariance with the residual's correlation in time
+//!    (`uncertainty`).
+//! 4. `standard`: standard parameters that a robot can have (`consistent`, `lmi`); the strength of
+//!    the prior is chosen by `cross_validation` over contiguous parts of the fit records.
+//! 5. `essential`: the base parameters that matter.
+//! 6. `validation`: residuals on fit and holdout records.
 
-pub mod aside;
-pub mod consistent;
-pub mod cross_validation;
-pub mod equations;
-pub mod essential;
-pub mod followers;
-pub mod identification;
+pub(crate) mod aside;
+pub(crate) mod consistent;
+pub(crate) mod cross_validation;
+pub(crate) mod equations;
+pub(crate) mod essential;
+pub(crate) mod followers;
+pub(crate) mod identification;
+#[doc(hidden)]
 pub mod json;
-pub mod linear;
-pub mod lmi;
-pub mod method;
-pub mod normal;
+pub(crate) mod linear;
+pub(crate) mod lmi;
+pub(crate) mod method;
+pub(crate) mod normal;
+#[doc(hidden)]
 pub mod page;
-pub mod settings;
-pub mod stack;
-pub mod standard;
-pub mod standstill;
-pub mod torque_units;
-pub mod trace;
-pub mod uncertainty;
-pub mod validation;
-pub mod weights;
+pub(crate) mod settings;
+pub(crate) mod stack;
+pub(crate) mod standard;
+pub(crate) mod standstill;
+pub(crate) mod torque_units;
+pub(crate) mod trace;
+pub(crate) mod uncertainty;
+pub(crate) mod validation;
+pub(crate) mod weights;
 
 pub use cross_validation::Trial;
+pub use essential::Essential;
 pub use identification::Identification;
 pub use settings::{Consistency, Method, Settings};
+pub use validation::{Errors, JointError, Validation};
 
 use crate::error::Result;
 use crate::log::Record;

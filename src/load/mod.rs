@@ -13,7 +13,7 @@
 //!   (base parameters of a serial robot, the platform of a parallel one);
 //! * friction: refitted for every record, because it changes with load and temperature.
 //!
-//! [`one_step`] solves this by weighted least squares in the space of the actuators. The weights are
+//! `one_step` solves this by weighted least squares in the space of the actuators. The weights are
 //! the inverse of the variance that the residual has at the speed of the actuator,
 //!
 //! ```text
@@ -29,28 +29,34 @@
 // sums over samples and parameters, written with the indices of the equations
 #![allow(clippy::needless_range_loop)]
 
+#[doc(hidden)]
 pub mod body;
-pub mod gain;
-pub mod identified;
+pub(crate) mod gain;
+pub(crate) mod identified;
+#[doc(hidden)]
 pub mod json;
-pub mod one_step;
+pub(crate) mod one_step;
+#[doc(hidden)]
 pub mod page;
-pub mod records;
-pub mod settings;
-pub mod system;
+pub(crate) mod records;
+pub(crate) mod settings;
+pub(crate) mod system;
+#[doc(hidden)]
 pub mod two_step;
-pub mod weight;
+pub(crate) mod weight;
 
 pub use body::LoadBody;
+pub use gain::Gains;
 pub use identified::Identified;
+pub use one_step::OneStep;
+#[doc(hidden)]
 pub use records::{Loaded, pressure_forces};
 pub use settings::{Method, Parameters, Settings};
+pub use two_step::TwoStep;
 
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Experiment, Payload};
 use crate::plant::Plant;
-use gain::Gains;
-use two_step::TwoStep;
 
 /// Identifies the load of the records whose payload is `"unknown"`. Records with `payload = "none"`
 /// identify the empty robot; records with a known load identify the drive gains.
@@ -65,6 +71,7 @@ pub fn identify(experiment: &Experiment, settings: &Settings) -> Result<Identifi
     Ok(found)
 }
 
+#[doc(hidden)]
 /// [`identify`] from signals.
 ///
 /// # Errors

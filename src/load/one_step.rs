@@ -5,8 +5,8 @@ mod reweight;
 mod solver;
 mod ten;
 
+pub use fitted::Fitted;
 pub(super) use fitted::rms;
-pub use fitted::{Fitted, JointFriction, Residual};
 pub(super) use solver::Solver;
 
 use super::body::LoadBody;
@@ -22,7 +22,7 @@ use crate::robot::Inertia;
 /// Condition number above which the motion hardly excites the load.
 const POOR: f64 = 1e4;
 
-/// Result of [`estimate`].
+/// Result of `estimate`.
 #[derive(Debug, Clone)]
 pub struct OneStep {
     /// the load

@@ -19,7 +19,7 @@
 //!
 //! **What is known of its errors.** The first column of `X₁` holds the measured force, so its noise
 //! makes `1/m` too small: `m̂/m − 1 ≈ tr(Cov f) / mean |f|²`. Step 1 does not use the moments, which
-//! carry the centre of mass; and an error of `c` goes into the tensor. Therefore [`one_step`](super::one_step)
+//! carry the centre of mass; and an error of `c` goes into the tensor. Therefore `one_step`
 //! is the default.
 
 use super::body::{LoadBody, Quantities, difference, from_quantities};

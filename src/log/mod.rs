@@ -10,22 +10,24 @@
 //! ```
 //!
 //! A [`Record`] is a log on an even time grid with everything that was wrong with it said
-//! ([`Record::warnings`]) and, where that is safe, repaired: see [`clock`] for the time stamps and
-//! [`channels`] for what cannot have been measured. Samples that were not measured (gaps, dropped
+//! ([`Record::warnings`]) and, where that is safe, repaired: see `clock` for the time stamps and
+//! `channels` for what cannot have been measured. Samples that were not measured (gaps, dropped
 //! or stuck or saturated channels) are interpolated where they must be, and marked in
 //! [`Record::valid`].
 
-pub mod channels;
-pub mod clock;
+pub(crate) mod channels;
+pub(crate) mod clock;
 mod experiment;
-pub mod number;
+pub(crate) mod number;
 mod record;
-pub mod resample;
-pub mod table;
+pub(crate) mod resample;
+pub(crate) mod table;
 mod written;
 
 pub use experiment::Experiment;
+#[doc(hidden)]
 pub use table::Table;
+#[doc(hidden)]
 pub use written::{Channels, Written};
 
 use crate::error::Warning;

@@ -20,42 +20,66 @@
 
 mod actuation;
 mod actuators;
+#[doc(hidden)]
 pub mod bundled;
 mod certificate;
+#[doc(hidden)]
 pub mod delta;
-pub mod file;
-pub mod follow;
+pub(crate) mod file;
+pub(crate) mod follow;
 mod forward;
-pub mod geometry;
+pub(crate) mod geometry;
+#[doc(hidden)]
 pub mod gough_stewart;
 mod gradients;
+#[doc(hidden)]
 pub mod h4;
-pub mod interval;
+pub(crate) mod interval;
+#[doc(hidden)]
 pub mod loops;
-pub mod margins;
+pub(crate) mod margins;
 mod motion;
 mod motion_file;
+#[doc(hidden)]
 pub mod parallelogram;
-pub mod parameters;
+pub(crate) mod parameters;
 mod reach;
 mod regressor;
+#[doc(hidden)]
 pub mod scalar;
 mod singularity;
 mod states;
-pub mod task;
+pub(crate) mod task;
 mod torque;
+#[doc(hidden)]
 pub mod tree;
 
-pub use certificate::{MechanismCertificate, PosePeak};
+pub use certificate::MechanismCertificate;
+#[doc(hidden)]
+pub use certificate::PosePeak;
+#[doc(hidden)]
 pub use forward::Solution;
-pub use geometry::{ClosedForm, Cone, Coordinates, Geometry, Kinematics, Path, Segment};
+pub use geometry::{ClosedForm, Coordinates, Kinematics, Segment};
+#[doc(hidden)]
+pub use geometry::{Cone, Geometry, Path};
+#[doc(hidden)]
 pub use gradients::TaskDerivatives;
 pub(crate) use gradients::rounded_sign;
+#[doc(hidden)]
 pub use margins::{Margins, PoseKind, PoseUse};
-pub use motion::{MechanismMotion, MechanismWorkspace};
-pub use parameters::{Group, Parameters, Pattern};
+#[doc(hidden)]
+pub use motion::MechanismMotion;
+pub use motion::MechanismWorkspace;
+#[doc(hidden)]
+pub use parameters::Parameters;
+pub use parameters::{Group, Pattern};
+pub use scalar::{Pack, Scalar};
+#[doc(hidden)]
 pub use singularity::{SINGULAR, Singularity, Spread};
-pub use task::{PlatformMotion, Task};
+#[doc(hidden)]
+pub use task::PlatformMotion;
+pub use task::Task;
+pub use tree::{Builder, Place};
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning, WarningKind};

@@ -21,7 +21,9 @@ mod values;
 
 pub use crate::robot::{Column, Parameter};
 pub use certify::Certified;
+#[doc(hidden)]
 pub use follow::Rates;
+#[doc(hidden)]
 pub use noise::DEFAULT_NOISE;
 
 use crate::base::{self, BaseParameters};

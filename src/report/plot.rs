@@ -15,7 +15,7 @@ mod canvas;
 mod panel;
 mod wireframe;
 
-pub use axis::{Axis, Spread};
+pub use axis::Axis;
 pub use bars::{Bar, bars};
 pub use wireframe::{Drawing, Line, wireframes};
 

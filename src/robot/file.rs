@@ -119,7 +119,7 @@ impl Robot {
     /// `<robot>` has none.
     ///
     /// # Errors
-    /// See [`Urdf::parse`] and [`Urdf::robot`].
+    /// See `Urdf::parse` and `Urdf::robot`.
     pub fn from_urdf_str(text: &str, name: &str) -> Result<Robot> {
         from_urdf(Text {
             file: Path::new(name),
@@ -131,8 +131,8 @@ impl Robot {
     /// call the former.
     ///
     /// # Errors
-    /// Unknown keys, unknown or repeated joints, numbers out of range; see also [`Urdf::parse`] and
-    /// [`Urdf::robot`].
+    /// Unknown keys, unknown or repeated joints, numbers out of range; see also `Urdf::parse` and
+    /// `Urdf::robot`.
     pub fn from_toml_str(toml: &str, urdf: &str, name: &str) -> Result<Robot> {
         let text = Text {
             file: Path::new(name),

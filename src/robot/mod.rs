@@ -6,14 +6,16 @@
 //! several bodies may follow one coordinate (URDF `mimic`): `q_body = ratio · q + offset`.
 
 mod assumed;
+#[doc(hidden)]
 pub mod bundled;
-pub mod file;
-pub mod inertia;
-pub mod meant;
+pub(crate) mod file;
+pub(crate) mod inertia;
+pub(crate) mod meant;
 mod parameter;
-pub mod urdf;
+pub(crate) mod urdf;
 
 pub use inertia::Inertia;
+#[doc(hidden)]
 pub use meant::Placement;
 pub use parameter::{Column, Parameter};
 
@@ -61,7 +63,7 @@ pub struct Body {
     /// joint position at zero coordinate; 0 except for mimic joints
     pub offset: f64,
     /// axis, rotation and position that the file means, where its rounded numbers say something
-    /// else; see [`meant`]
+    /// else; see `meant`
     pub meant: Option<Placement>,
 }
 

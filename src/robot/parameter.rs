@@ -5,7 +5,7 @@ use super::JointTerm;
 /// What one column of a regressor stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
-    /// inertial parameter `k` (see [`inertia::NAMES`](super::inertia::NAMES)) of body `body`
+    /// inertial parameter `k` (see `inertia::NAMES`) of body `body`
     Inertial {
         /// index into [`Robot::bodies`](super::Robot::bodies)
         body: usize,

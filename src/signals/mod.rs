@@ -24,18 +24,24 @@
 //! Of a parallel robot the logged positions are those of its actuators; the coordinates are the pose of
 //! its platform, from forward kinematics sample by sample ([`Plant::coordinates_of`](crate::Plant::coordinates_of)).
 
+#[doc(hidden)]
 pub mod butterworth;
+#[doc(hidden)]
 pub mod cutoff;
-pub mod decimate;
+pub(crate) mod decimate;
+#[doc(hidden)]
 pub mod fourier;
 mod grid;
 mod prepare;
-pub mod repeats;
-pub mod series;
-pub mod wiener;
+pub(crate) mod repeats;
+pub(crate) mod series;
+pub(crate) mod wiener;
 
+#[doc(hidden)]
 pub use butterworth::Butterworth;
+#[doc(hidden)]
 pub use decimate::Decimator;
+#[doc(hidden)]
 pub use prepare::{averaged, common_cutoff};
 
 use crate::dynamics::Samples;
@@ -51,7 +57,7 @@ pub enum Derivation {
     /// Butterworth filter otherwise
     #[default]
     LowPass,
-    /// as the diagnosis does it ([`wiener`]): every harmonic of a motion that repeats weighted by how far it
+    /// as the diagnosis does it (`wiener`): every harmonic of a motion that repeats weighted by how far it
     /// stands out of the scatter between periods, a fixed low-pass otherwise
     Wiener,
 }

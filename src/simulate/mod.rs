@@ -5,7 +5,7 @@
 //! M(x) ẍ + b(x, ẋ) + Dᵀ f(q̇) = D_aᵀ τ(t, x, ẋ)
 //! ```
 //!
-//! ([`dynamics`]) with the controller of [`control`], friction that sticks and slides ([`friction`])
+//! (`dynamics`) with the controller of `control`, friction that sticks and slides (`friction`)
 //! and the deviations from the nominal model that the user asks for ([`effects`]). The classic
 //! Runge-Kutta method of fourth order runs with a fixed largest step; where a joint's velocity
 //! passes zero the step is cut there, to rounding, so that friction never changes inside a step.
@@ -26,19 +26,24 @@
 //! # Ok::<(), excite::Error>(())
 //! ```
 
-pub mod control;
-pub mod dynamics;
+pub(crate) mod control;
+pub(crate) mod dynamics;
+#[doc(hidden)]
 pub mod effects;
-pub mod friction;
+pub(crate) mod friction;
+#[doc(hidden)]
 pub mod monte_carlo;
+#[doc(hidden)]
 pub mod record;
-pub mod run;
-pub mod settings;
+pub(crate) mod run;
+pub(crate) mod settings;
 mod simulator;
 
 pub use control::Controller;
+#[doc(hidden)]
 pub use dynamics::{Dynamics, Terms};
 pub use effects::{Effects, Field};
+pub use record::{Measured, Sensors, measure, to_record};
 pub use run::Run;
 pub use settings::Settings;
 

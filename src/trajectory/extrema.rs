@@ -13,7 +13,7 @@
 //! halves the others; intervals around the maximum shrink until the bound is within rounding. The
 //! rounding of the evaluation itself is bounded too and added.
 //!
-//! [`extrema_fast`](super::extrema_fast) is for the inner loop of an optimiser: no proof.
+//! `extrema_fast` is for the inner loop of an optimiser: no proof.
 
 use super::fourier::{HARMONIC_MAX, Series, sin_cos_turns};
 use super::table::Table;

@@ -119,7 +119,7 @@ impl Fourier {
     }
 
     /// Whether the period is positive and finite, the harmonics strictly increase from at least 1
-    /// to at most [`HARMONIC_MAX`], there is a joint, and every joint has as many finite
+    /// to at most `HARMONIC_MAX`, there is a joint, and every joint has as many finite
     /// coefficients as there are harmonics. Otherwise place and message of the first fault; the
     /// place is written as in `trajectory.json`.
     pub fn check(&self) -> Result<(), (String, String)> {

@@ -3,29 +3,43 @@
 //! A motion is a [`Fourier`] series per joint over one shared list of harmonics, so it is smooth,
 //! repeats for ever, and all its derivatives are known in closed form. From here come the
 //! parametrisation an optimiser works in ([`Basis`]), the exact extrema over all time
-//! ([`mod@extrema`]), the proof that a robot's limits hold ([`certificate`], [`torque`]), the
-//! files ([`file`](mod@file), [`samples`]) and the moves to and from the start ([`transition`]).
+//! ([`mod@extrema`]), the proof that a robot's limits hold ([`certificate`], `torque`), the
+//! files (`file`, [`samples`]) and the moves to and from the start ([`transition`]).
 
-pub mod basis;
+pub(crate) mod basis;
+#[doc(hidden)]
 pub mod certificate;
+#[doc(hidden)]
 pub mod extrema;
 mod extrema_fast;
-pub mod file;
-pub mod fourier;
-pub mod grid;
+pub(crate) mod file;
+pub(crate) mod fourier;
+pub(crate) mod grid;
+#[doc(hidden)]
 pub mod jets;
+#[doc(hidden)]
 pub mod samples;
-pub mod table;
-pub mod torque;
+pub(crate) mod table;
+pub(crate) mod torque;
+#[doc(hidden)]
 pub mod transition;
 
-pub use basis::{Basis, Ends};
-pub use certificate::{Certificate, Proof, TorqueBound, certify};
+#[doc(hidden)]
+pub use basis::Basis;
+pub use basis::Ends;
+pub use certificate::{Certificate, JointCertificate, Peak, Proof, Range, TorqueBound, certify};
+#[doc(hidden)]
 pub use extrema::{Extrema, Extremum, extrema};
+#[doc(hidden)]
 pub use extrema_fast::extrema_fast;
 pub use file::{Space, Trajectory};
-pub use fourier::{Fourier, RATE, Series, sample_period};
+pub use fourier::{Fourier, Series};
+#[doc(hidden)]
+pub use fourier::{RATE, sample_period};
 pub use grid::Grid;
+#[doc(hidden)]
 pub use samples::Samples;
+#[doc(hidden)]
 pub use table::{Sampled, Table};
+#[doc(hidden)]
 pub use torque::torque_certificate;

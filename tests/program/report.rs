@@ -1,7 +1,7 @@
 //! The report before the run: what it says, that it stands alone, and that it never breaks.
 
+use excite::design::Settings;
 use excite::design::record::{Record, Start, Status};
-use excite::design::settings::Settings;
 use excite::identifiability::json::json;
 use excite::identifiability::page::{Grade, html, verdict};
 use excite::identifiability::{Assessment, Excitation, assess};
