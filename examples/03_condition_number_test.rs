@@ -30,7 +30,7 @@ fn main() -> Result<(), Error> {
 
 #[test]
 fn panda_trajectory_excites_and_is_safe() {
-    let e = assess().expect("robot and trajectory are there");
+    let e = excitation().expect("robot and trajectory are there");
     assert!(e.condition.invariant < 6.5, "{}", e.condition.invariant);
     assert!(e.certificate.satisfied);
 }

@@ -83,7 +83,7 @@ pub struct StandardParameter {
 }
 
 /// The base parameters of a robot. See the [module](self) documentation.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct BaseParameters {
     /// names of the standard parameters, in column order
     pub names: Vec<String>,
@@ -94,9 +94,11 @@ pub struct BaseParameters {
     /// dropped columns, ascending
     pub dropped: Vec<usize>,
     /// `K`, `b × (p − b)`: `π_b = φ_kept + K φ_dropped`
+    #[serde(serialize_with = "crate::output::rows")]
     pub k: Mat<f64>,
     /// orthonormal basis `V` (`p × b`) of the row space of `W`: `W V` has the non-zero singular
     /// values of `W`
+    #[serde(serialize_with = "crate::output::rows")]
     pub row_space: Mat<f64>,
     /// singular values of `W` over random states, largest first, relative to the largest
     pub singular_values: Vec<f64>,
@@ -146,6 +148,19 @@ pub fn random_states(robot: &Robot, count: usize, seed: u64) -> Samples {
 
 impl BaseParameters {
     /// Base parameters of a robot with the joint columns it asks for.
+    ///
+    /// ```
+    /// use excite::Robot;
+    /// use excite::base::{BaseParameters, Identifiability};
+    ///
+    /// let base = BaseParameters::new(&Robot::load("planar2")?)?;
+    /// for p in &base.standard {
+    ///     if p.identifiability == Identifiability::None {
+    ///         println!("{}: {}", p.name, p.reason);
+    ///     }
+    /// }
+    /// # Ok::<(), excite::Error>(())
+    /// ```
     ///
     /// # Errors
     /// When the decomposition fails, which needs numbers that are not finite.

@@ -1,10 +1,33 @@
-//! Writing files: whole or not at all, and never over something by accident.
+//! Writing files: whole or not at all, and never over something by accident. Matrices in serialised results.
 
 use crate::error::{Error, Result};
+use faer::Mat;
+use nalgebra::Vector3;
+use serde::{Serialize, Serializer};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A matrix in a serialised result: a list of its rows.
+///
+/// # Errors
+/// Those of the serialiser.
+pub fn rows<S: Serializer>(m: &Mat<f64>, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    let row = |i: usize| (0..m.ncols()).map(move |j| m[(i, j)]).collect::<Vec<f64>>();
+    serializer.collect_seq((0..m.nrows()).map(row))
+}
+
+/// Two points in a serialised result: a list of their coordinates.
+///
+/// # Errors
+/// Those of the serialiser.
+pub fn points<S: Serializer>(
+    ends: &[Vector3<f64>; 2],
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    ends.map(|p| [p.x, p.y, p.z]).serialize(serializer)
+}
 
 /// Removes the temporary file unless it has been renamed.
 struct Temporary(Option<PathBuf>);

@@ -75,6 +75,19 @@ pub fn design(plant: &Plant, settings: &Settings) -> Result<Design> {
 /// [`design`] with progress and cancellation. When it is cancelled, and when a time limit ends the
 /// run, the best feasible trajectory so far is returned.
 ///
+/// ```
+/// use excite::Plant;
+/// use excite::design::{Control, Progress, Settings, design_with};
+///
+/// let plant = Plant::load("planar2")?;
+/// let settings = Settings { starts: Some(1), ..Settings::default() };
+/// let tell = |p: Progress| println!("{} starts, best {:.2}", p.starts, p.best);
+/// let control = Control { progress: &tell, ..Control::default() };
+/// let result = design_with(&plant, &settings, &control)?;
+/// assert!(!result.record.starts.is_empty());
+/// # Ok::<(), excite::Error>(())
+/// ```
+///
 /// # Errors
 /// As [`design`].
 pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Result<Design> {

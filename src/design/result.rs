@@ -6,9 +6,12 @@ use crate::trajectory::Trajectory;
 use std::sync::atomic::AtomicBool;
 
 /// A designed trajectory and how it came about.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Design {
-    /// the robot, with the limits that were assumed where it states none
+    /// the robot, with the limits that were assumed where it states none; not serialised, it is a file
+    /// of its own
+    #[serde(skip)]
     pub plant: Plant,
     /// the trajectory, inside all limits for all time
     pub trajectory: Trajectory,

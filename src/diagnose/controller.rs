@@ -43,7 +43,7 @@ pub enum Kind {
 }
 
 /// An identified feedback.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Feedback {
     /// what it acts on
     pub kind: Kind,

@@ -7,7 +7,8 @@ use super::thresholds::THRESHOLDS;
 use super::verdict::Decision;
 
 /// One effect in the result.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Finding {
     /// name, as in `formats.md`
     pub effect: &'static str,

@@ -46,7 +46,7 @@ pub const LONGEST: f64 = T.forward.longest;
 pub const MODELS: [&str; 3] = ["nominal", "refitted", "improved"];
 
 /// Simulation of one record with the three [`MODELS`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Simulated {
     /// name of the record
     pub record: String,
@@ -65,7 +65,7 @@ pub struct Simulated {
 }
 
 /// Forward simulation of the holdout records (of the first fitted one where there is none).
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize)]
 pub struct Forward {
     /// records
     pub records: Vec<Simulated>,

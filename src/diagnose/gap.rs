@@ -13,7 +13,7 @@ use crate::signals::series::Series;
 use crate::signals::wiener::triangle;
 
 /// Gap of one actuator in physical units.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize)]
 pub struct JointGap {
     /// name
     pub joint: String,
@@ -28,7 +28,7 @@ pub struct JointGap {
 }
 
 /// How the gap divides.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
 pub struct Shares {
     /// odd under half a period, `None` where the motion is not odd
     pub odd: Option<f64>,

@@ -21,9 +21,11 @@ use crate::plant::Plant;
 use crate::robot::Robot;
 
 /// The improved model.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Improved {
-    /// bodies and joints with the parameters that were fitted and the effects that they can hold
+    /// bodies and joints with the parameters that were fitted and the effects that they can hold; not
+    /// serialised, the writers of [`export`](crate::export) write it
+    #[serde(skip)]
     pub robot: Robot,
     /// the effects found
     pub remarks: Vec<Remark>,

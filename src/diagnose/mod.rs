@@ -120,6 +120,18 @@ pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
 
 /// Diagnoses an experiment.
 ///
+/// ```no_run
+/// use excite::diagnose::{Settings, diagnose};
+/// use excite::log::Experiment;
+///
+/// let experiment = Experiment::read("experiment.toml")?;
+/// let found = diagnose(&experiment, &Settings::default(), &|step| println!("{step}"))?;
+/// for finding in found.findings.iter().filter(|f| f.is_claim()) {
+///     println!("{} {:?}: {:.2}", finding.title, finding.joints, finding.confidence);
+/// }
+/// # Ok::<(), excite::Error>(())
+/// ```
+///
 /// # Errors
 /// As [`prepare`].
 pub fn diagnose(

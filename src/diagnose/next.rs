@@ -39,7 +39,8 @@ pub const INVISIBLE: f64 = T.next.invisible;
 const BATCH: usize = 8;
 
 /// The next experiment.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Proposal {
     /// the two effects; an effect and [`NOMINAL`] where it is invisible in the records at hand
     pub separates: Vec<&'static str>,

@@ -17,7 +17,7 @@ use crate::log::Payload;
 use crate::signals::series::Series;
 
 /// Energy of the gap in one record before and after the set, in units of the noise variance a sample.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct RecordGap {
     /// name
     pub name: String,
@@ -32,7 +32,8 @@ pub struct RecordGap {
 }
 
 /// Result of a diagnosis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Diagnosis {
     /// robot
     pub robot: String,

@@ -4,7 +4,7 @@ use super::data::Data;
 use super::noise::{LINES, spectrum};
 
 /// Series for the figures of one actuator: a period or the beginning of one record.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize)]
 pub struct Trace {
     /// time, s
     pub t: Vec<f64>,

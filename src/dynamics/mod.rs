@@ -30,7 +30,7 @@ use rayon::prelude::*;
 
 /// A sampled motion of all coordinates, joint by joint: joint `j` at sample `i` is
 /// `q[j * count + i]`.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Samples {
     /// number of coordinates
     pub dof: usize,

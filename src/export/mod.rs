@@ -38,7 +38,7 @@ pub struct Model<'a> {
 }
 
 /// A part of a model, in which an effect may be held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub enum Part {
     /// inertia of bodies
     Bodies,

@@ -4,7 +4,7 @@ use super::{Format, Part};
 use std::collections::BTreeMap;
 
 /// An effect of a model, in words.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Remark {
     /// name of the effect
     pub effect: &'static str,

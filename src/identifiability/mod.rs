@@ -59,7 +59,8 @@ pub struct Prediction {
 }
 
 /// Everything that the report before the run says about one trajectory.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Excitation {
     /// the trajectory
     pub trajectory: Trajectory,
@@ -85,9 +86,12 @@ pub struct Excitation {
 }
 
 /// The report before the run, of a robot alone or with a trajectory.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Assessment {
-    /// the robot; of a parallel one its actuators as joints, without bodies
+    /// the robot; of a parallel one its actuators as joints, without bodies; not serialised, it is a file
+    /// of its own
+    #[serde(skip)]
     pub robot: Robot,
     /// its base parameters
     pub base: BaseParameters,
@@ -104,6 +108,17 @@ pub struct Assessment {
 }
 
 /// What a robot can tell at all, or on this trajectory.
+///
+/// ```
+/// use excite::Plant;
+/// use excite::identifiability::assess;
+///
+/// // without a trajectory: what any motion can tell
+/// let report = assess(&Plant::load("planar2")?, None)?;
+/// assert!(report.base.count() > 0 && report.excitation.is_none());
+/// println!("{}", serde_json::to_string(&report).expect("it is serialisable"));
+/// # Ok::<(), excite::Error>(())
+/// ```
 ///
 /// # Errors
 /// As [`BaseParameters::new`]; a trajectory of another robot, or one that leaves the reach of a closed

@@ -7,7 +7,7 @@ use crate::mechanism::{Mechanism, MechanismCertificate, PoseUse, Segment, Task};
 use crate::trajectory::{RATE, Space};
 
 /// What the platform of a parallel robot does.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Platform {
     /// what its coordinates are
     pub task: Task,

@@ -16,7 +16,7 @@ pub struct Removal {
 }
 
 /// What is left, and what it cost.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Essential {
     /// base parameters that stay
     pub kept: Vec<usize>,

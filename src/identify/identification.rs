@@ -9,7 +9,8 @@ use crate::signals::Prepared;
 use faer::Mat;
 
 /// What identification came to.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Identification {
     /// base parameters of the plant
     pub base: BaseParameters,
@@ -18,6 +19,7 @@ pub struct Identification {
     /// standard deviations of it, correlation in time included
     pub std: Vec<f64>,
     /// the whole covariance
+    #[serde(serialize_with = "crate::output::rows")]
     pub covariance: Mat<f64>,
     /// standard deviations that the robot file's torque noise promises, white
     pub predicted_std: Vec<f64>,
@@ -42,12 +44,14 @@ pub struct Identification {
     /// condition number of the weighted equations
     pub condition: f64,
     /// covariance of the residual between actuators, (N m)²
+    #[serde(serialize_with = "crate::output::rows")]
     pub residual_covariance: Mat<f64>,
     /// share of the samples that the robust method set aside
     pub outliers: Option<f64>,
     /// residuals record by record, of the base estimate and of the consistent one
     pub validation: Validation,
-    /// records as they were used, in the order of the experiment
+    /// records as they were used, in the order of the experiment; not serialised
+    #[serde(skip)]
     pub prepared: Vec<Prepared>,
     /// everything imperfect
     pub warnings: Vec<Warning>,

@@ -54,6 +54,29 @@ use normal::Normal;
 
 /// Identifies a plant from records.
 ///
+/// ```
+/// use excite::Plant;
+/// use excite::identify::{Settings, identify};
+/// use excite::log::Purpose;
+/// use excite::simulate::{Sensors, Settings as Simulation, measure, simulate, to_record};
+///
+/// // a rehearsal: design, simulate, measure
+/// let plant = Plant::load("planar2")?;
+/// let settings = excite::design::Settings { starts: Some(1), ..Default::default() };
+/// let motion = excite::design::design(&plant, &settings)?.trajectory.fourier;
+/// let settings = Simulation::default();
+/// let run = simulate(&plant, &motion, 3, &settings, &|_| {})?;
+/// let measured = measure(&run, &Sensors::new(&plant, 1.0).0, &settings.effects, 1);
+/// let record = to_record(&run, &measured, Purpose::Fit, motion.period);
+///
+/// let found = identify(&plant, &[record], &Settings::default())?;
+/// for (a, pi) in found.pi.iter().enumerate() {
+///     println!("{} = {pi:.4} ± {:.4}", found.base.combination(a), found.std[a]);
+/// }
+/// assert_eq!(found.pi.len(), found.base.count());
+/// # Ok::<(), excite::Error>(())
+/// ```
+///
 /// # Errors
 /// No record for the fit, settings that cannot be, records that carry an unknown payload.
 pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Result<Identification> {

@@ -4,7 +4,7 @@ use super::stack::Stack;
 use crate::log::Purpose;
 
 /// Measured and predicted torque of one record: actuator-major over the filtered samples.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Trace {
     /// name of the record
     pub name: String,

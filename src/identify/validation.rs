@@ -29,7 +29,7 @@ pub struct Errors {
 }
 
 /// All of it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Validation {
     /// of the model that is written, on the fit records
     pub fit: Errors,

@@ -8,11 +8,12 @@ use faer::Mat;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// A load with its uncertainty.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct LoadBody {
     /// the ten parameters about the origin of the frame
     pub inertia: Inertia,
     /// their covariance, 10 × 10; rows and columns of what was not identified are zero
+    #[serde(serialize_with = "crate::output::rows")]
     pub covariance: Mat<f64>,
     /// which of the ten were identified
     pub known: [bool; 10],

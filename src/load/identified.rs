@@ -8,7 +8,8 @@ use super::two_step::TwoStep;
 use crate::error::Warning;
 
 /// Everything that is known of the load afterwards.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize)]
+#[non_exhaustive]
 pub struct Identified {
     /// robot
     pub robot: String,

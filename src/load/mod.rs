@@ -61,6 +61,16 @@ use crate::plant::Plant;
 /// Identifies the load of the records whose payload is `"unknown"`. Records with `payload = "none"`
 /// identify the empty robot; records with a known load identify the drive gains.
 ///
+/// ```no_run
+/// use excite::load::{Settings, identify};
+/// use excite::log::Experiment;
+///
+/// let experiment = Experiment::read("experiment.toml")?;
+/// let found = identify(&experiment, &Settings::default())?;
+/// println!("{:.3} kg", found.load().inertia.mass());
+/// # Ok::<(), excite::Error>(())
+/// ```
+///
 /// # Errors
 /// No record with an unknown load; signals that cannot be used; a motion that does not excite the
 /// load.

@@ -23,7 +23,7 @@ use crate::robot::Inertia;
 const POOR: f64 = 1e4;
 
 /// Result of `estimate`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct OneStep {
     /// the load
     pub load: LoadBody,

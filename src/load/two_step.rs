@@ -80,13 +80,15 @@ impl PlatformSample {
 }
 
 /// Result of the two steps for everything that moves with the platform.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Total {
     /// mass, centre of mass, tensor about the centre of mass
     pub values: Quantities,
     /// covariance of `[1/m, r]`
+    #[serde(serialize_with = "crate::output::rows")]
     pub first: Mat<f64>,
     /// covariance of the tensor
+    #[serde(serialize_with = "crate::output::rows")]
     pub second: Mat<f64>,
     /// root mean square of the residuals: m/s² and N m
     pub residuals: [f64; 2],
@@ -185,7 +187,7 @@ pub fn total(samples: &[PlatformSample], gravity: &Vector3<f64>) -> Result<Total
 }
 
 /// Result of [`estimate`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct TwoStep {
     /// the load: total minus platform
     pub load: LoadBody,

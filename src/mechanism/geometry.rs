@@ -37,11 +37,12 @@ impl<S> Coordinates<S> for [S] {
 pub type Path = super::interval::Series<super::interval::Interval, 5>;
 
 /// A line between two points of the mechanism, for pictures and distances.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Segment {
     /// what it is: `leg3`, `arm1`, `platform`
     pub name: String,
     /// its ends in base axes, m
+    #[serde(serialize_with = "crate::output::points")]
     pub ends: [Vector3<f64>; 2],
 }
 

@@ -22,7 +22,7 @@ pub struct Margins {
 }
 
 /// Use of one limit of a pose.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct PoseUse {
     /// what: `leg3 base` (a passive joint), `singularity`, `leg1 to leg4`
     pub name: String,

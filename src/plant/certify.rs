@@ -13,7 +13,8 @@ use crate::trajectory::torque::torque_certificate;
 const TORQUE_SAMPLES: usize = 2000;
 
 /// What is known of all limits of a plant along a motion.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Certified {
     /// position, velocity, acceleration, jerk and torque of the actuators; whether every limit
     /// holds, and the worst of all, those of the pose of a closed chain included
@@ -51,6 +52,18 @@ impl Certified {
 impl Plant {
     /// Judges a motion of the coordinates against all limits times `derate` (positions keep the
     /// middle of their range; the workspace box of a closed chain is taken as it is).
+    ///
+    /// ```
+    /// use excite::Plant;
+    /// use excite::trajectory::{Fourier, Series};
+    ///
+    /// let plant = Plant::load("planar2")?;
+    /// let swing = Series { constant: 0.0, sin: vec![0.1], cos: vec![0.0] };
+    /// let fourier = Fourier::new(5.0, vec![1], vec![swing.clone(), swing])?;
+    /// let certified = plant.certify(&fourier, 0.9)?; // within 90 % of all limits?
+    /// assert_eq!(certified.satisfied(), certified.broken().is_none());
+    /// # Ok::<(), excite::Error>(())
+    /// ```
     ///
     /// # Errors
     /// A motion of another robot, or one that leaves the reach of a closed chain.

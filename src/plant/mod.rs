@@ -264,6 +264,15 @@ impl Plant {
 
     /// Base parameters: rank of the regressor over random states.
     ///
+    /// ```
+    /// let base = excite::Plant::load("planar2")?.base()?;
+    /// assert!(base.count() > 0 && base.count() < base.names.len());
+    /// for a in 0..base.count() {
+    ///     println!("{}", base.combination(a));
+    /// }
+    /// # Ok::<(), excite::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`BaseParameters::new`].
     pub fn base(&self) -> Result<BaseParameters> {

@@ -66,6 +66,19 @@ const REPORT: usize = 256;
 /// Runs `periods` periods of a reference in the coordinates of the plant. `progress` is called with
 /// the fraction done.
 ///
+/// ```
+/// use excite::Plant;
+/// use excite::simulate::{Settings, simulate};
+/// use excite::trajectory::{Fourier, Series};
+///
+/// let plant = Plant::load("planar2")?;
+/// let swing = Series { constant: 0.0, sin: vec![0.1], cos: vec![0.0] };
+/// let fourier = Fourier::new(2.0, vec![1], vec![swing.clone(), swing])?;
+/// let run = simulate(&plant, &fourier, 1, &Settings::default(), &|_| {})?;
+/// assert_eq!(run.t.len(), 2000); // 2 s at 1 kHz
+/// # Ok::<(), excite::Error>(())
+/// ```
+///
 /// # Errors
 /// [`Error::Argument`]: settings that cannot be. [`Error::Infeasible`]: a pose that cannot be
 /// reached, a mass matrix that is not positive definite, a robot that does not follow.

@@ -8,7 +8,7 @@ use crate::trajectory::Fourier;
 use nalgebra::DVector;
 
 /// What really happened: the simulated motion without any sensor.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Run {
     /// times, s, from 0
     pub t: Vec<f64>,

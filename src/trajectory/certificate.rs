@@ -190,7 +190,8 @@ impl TorqueBound {
 }
 
 /// How it is known that kinematic limits hold between the samples, the strongest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Proof {
     /// exact extrema of a series over all time
     Exact,
@@ -310,6 +311,20 @@ impl Certificate {
 /// Exact extrema of every joint's position, velocity, acceleration and jerk over all time (see
 /// [`extrema`]), compared with the robot's limits. Torques are added by
 /// [`Certificate::with_torque`].
+///
+/// ```
+/// use excite::Robot;
+/// use excite::trajectory::{Fourier, Series, certify};
+///
+/// let robot = Robot::load("planar2")?;
+/// // 0.1 sin(2π t / 5 s) for both joints
+/// let swing = Series { constant: 0.0, sin: vec![0.1], cos: vec![0.0] };
+/// let fourier = Fourier::new(5.0, vec![1], vec![swing.clone(), swing])?;
+/// let certificate = certify(&robot, &fourier)?;
+/// let speed = certificate.joints[0].velocity;
+/// assert!((speed.value - 0.1 * fourier.omega()).abs() < 1e-9 && speed.value <= speed.bound);
+/// # Ok::<(), excite::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Argument`] if the trajectory is malformed or has another number of joints than the

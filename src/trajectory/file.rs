@@ -199,11 +199,19 @@ impl Trajectory {
         let unusable = |place: String, message: String| {
             Error::Argument(format!("trajectory, {place}: {message}"))
         };
+        let document = self.document().map_err(|(p, m)| unusable(p, m))?;
+        let text = serde_json::to_string_pretty(&document)
+            .map_err(|e| unusable("settings".into(), e.to_string()))?;
+        document
+            .check()
+            .map_err(|(place, message)| unusable(place, message))?;
+        Ok(text + "\n")
+    }
+
+    /// What the file holds.
+    fn document(&self) -> Result<Document, (String, String)> {
         if self.joints.len() != self.fourier.dof() {
-            return Err(unusable(
-                "joints".into(),
-                "one name per series is needed".into(),
-            ));
+            return Err(("joints".into(), "one name per series is needed".into()));
         }
         let coefficients = self
             .joints
@@ -216,7 +224,7 @@ impl Trajectory {
                 cos: s.cos.clone(),
             })
             .collect();
-        let document = Document {
+        Ok(Document {
             format: FORMAT.into(),
             version: VERSION,
             excite_version: self.excite_version.clone(),
@@ -232,13 +240,7 @@ impl Trajectory {
             ends: self.ends,
             grid: self.grid,
             settings: self.settings.clone(),
-        };
-        let text = serde_json::to_string_pretty(&document)
-            .map_err(|e| unusable("settings".into(), e.to_string()))?;
-        document
-            .check()
-            .map_err(|(place, message)| unusable(place, message))?;
-        Ok(text + "\n")
+        })
     }
 
     /// Whether the trajectory can be run on a robot: the same joints in the same order. A robot
@@ -271,6 +273,16 @@ impl Trajectory {
                  judged by the present ones",
             )
         }))
+    }
+}
+
+/// As in `trajectory.json`.
+impl serde::Serialize for Trajectory {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let document = self.document();
+        document
+            .map_err(|(place, message)| serde::ser::Error::custom(format!("{place}: {message}")))?
+            .serialize(serializer)
     }
 }
 

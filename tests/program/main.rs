@@ -9,3 +9,4 @@ mod documents;
 mod mutations;
 mod rehearsal;
 mod report;
+mod surface;

@@ -4,7 +4,8 @@ use crate::robot::Motion;
 use std::ops::Index;
 
 /// Where an effect sits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Place {
     /// on the whole robot
     Robot,
@@ -50,7 +51,7 @@ impl Place {
 }
 
 /// What does not enter linearly: a form among those of the effect, and its constants.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Shape {
     /// which of the forms of the effect, from 0
     pub form: u8,
@@ -94,7 +95,7 @@ pub struct Estimate {
 }
 
 /// One number of an effect.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Value {
     /// name
     pub name: &'static str,

@@ -34,7 +34,7 @@ pub struct Residual {
 }
 
 /// One record after the fit, for the report; lists actuator-major.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Fitted {
     /// name of the record
     pub name: String,

@@ -1,0 +1,74 @@
+//! What the library shows: few modules, and results that can be serialised.
+
+use excite::Plant;
+use excite::design::{Settings, design};
+use excite::identifiability::assess;
+use serde_json::{Value, to_value};
+
+/// Modules of a file that are documented: `pub mod` without `#[doc(hidden)]` in the line before.
+fn shown(file: &str) -> Vec<String> {
+    let path = format!("{}/src/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).expect("read");
+    let lines: Vec<&str> = text.lines().collect();
+    (0..lines.len())
+        .filter(|&i| i == 0 || lines[i - 1] != "#[doc(hidden)]")
+        .filter_map(|i| lines[i].strip_prefix("pub mod ")?.strip_suffix(';'))
+        .map(String::from)
+        .collect()
+}
+
+/// A stage shows names, no modules: what a user needs is re-exported by its `mod.rs`.
+#[test]
+fn stages_show_names_and_no_modules() {
+    let stages = shown("lib.rs");
+    assert!(stages.len() < 20, "{stages:?}");
+    for stage in ["design", "identify", "load", "diagnose", "simulate"] {
+        assert!(stages.iter().any(|s| s == stage), "{stage} is not shown");
+    }
+    for stage in stages {
+        let path = format!("{}/src/{stage}/mod.rs", env!("CARGO_MANIFEST_DIR"));
+        if std::path::Path::new(&path).exists() {
+            let modules = shown(&format!("{stage}/mod.rs"));
+            assert!(modules.is_empty(), "{stage} shows {modules:?}");
+        }
+    }
+}
+
+#[test]
+fn results_are_serialised() {
+    fn serialisable<T: serde::Serialize>() {}
+    serialisable::<excite::identify::Identification>();
+    serialisable::<excite::load::Identified>();
+    serialisable::<excite::diagnose::Diagnosis>();
+    serialisable::<excite::simulate::Run>();
+    serialisable::<excite::plant::Certified>();
+
+    let plant = Plant::load("planar2").unwrap();
+    let settings = Settings {
+        starts: Some(1),
+        ..Settings::default()
+    };
+    let found = design(&plant, &settings).unwrap();
+    let designed = to_value(&found).unwrap();
+    let file: Value = serde_json::from_str(&found.trajectory.to_json().unwrap()).unwrap();
+    assert_eq!(designed["trajectory"], file);
+    assert_eq!(designed["value"], found.value);
+
+    let report = assess(&found.plant, Some(&found.trajectory)).unwrap();
+    let assessed = to_value(&report).unwrap();
+    let base = &assessed["base"];
+    let k = base["k"].as_array().unwrap();
+    assert_eq!(k.len(), report.base.count());
+    for (i, row) in k.iter().enumerate() {
+        let row = row.as_array().unwrap();
+        assert_eq!(row.len(), report.base.dropped.len());
+        for (j, value) in row.iter().enumerate() {
+            assert_eq!(*value, report.base.k[(i, j)]);
+        }
+    }
+    let excitation = report.excitation.unwrap();
+    let of = &assessed["excitation"];
+    assert_eq!(of["condition"]["invariant"], excitation.condition.invariant);
+    assert_eq!(of["certificate"]["satisfied"], true);
+    assert_eq!(of["trajectory"], file);
+}
