@@ -277,19 +277,12 @@ fn the_example_of_an_experiment_is_read() {
     let joints = plant.actuators().len();
     let mut columns = Vec::new();
     for group in documented(section(&text, "## Log: CSV")) {
-        let Some(stem) = group.strip_suffix('1') else {
-            columns.extend(
-                group
-                    .split(' ')
-                    .filter(|c| !c.ends_with('n'))
-                    .flat_map(|c| match c.strip_suffix('1') {
-                        Some(stem) => (1..=joints).map(|j| format!("{stem}{j}")).collect(),
-                        None => vec![c.to_string()],
-                    }),
-            );
-            continue;
-        };
-        columns.extend((1..=joints).map(|j| format!("{stem}{j}")));
+        for column in group.split(' ').filter(|c| !c.ends_with('n')) {
+            match column.strip_suffix('1') {
+                Some(stem) => columns.extend((1..=joints).map(|j| format!("{stem}{j}"))),
+                None => columns.push(column.to_string()),
+            }
+        }
     }
     for name in [
         "t", "q2", "tau2", "dq2", "ddq2", "qref2", "ql2", "pa2", "pb2", "qw",
@@ -374,7 +367,9 @@ fn links_lead_somewhere() {
         for reference in text
             .split('[')
             .skip(1)
-            .filter_map(|r| r.split(']').next())
+            .filter_map(|r| r.split_once(']'))
+            .filter(|(_, after)| !after.starts_with('('))
+            .map(|(reference, _)| reference)
             .filter(|r| r.ends_with(".md") && !r.contains('('))
         {
             assert!(

@@ -223,7 +223,7 @@ fn urdf_errors_say_where_and_what_to_do() {
                 "value=\"2\"/>",
                 "value=\"1e300\"/><origin xyz=\"1e300 0 0\"/>",
             ),
-            &["link `upper`", "overflows"],
+            &["link `upper`", "is the most that is read"],
         ),
         (
             replaced("velocity=\"3\"", "velocity=\"-3\""),

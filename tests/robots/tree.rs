@@ -370,9 +370,9 @@ fn locked_joints_merge_at_their_position_and_take_followers_along() {
             .any(|w| w.contains("`j3`") && w.contains("held at")),
         "{said:?}"
     );
+    // what is stated of a locked joint waits for its return, and is no matter for a warning
     assert!(
-        said.iter()
-            .any(|w| w.contains("`j2`") && w.contains("no effect")),
+        !said.iter().any(|w| w.starts_with("joint `j2`")),
         "{said:?}"
     );
 
