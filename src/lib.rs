@@ -62,6 +62,8 @@
 
 pub mod base;
 #[doc(hidden)]
+pub mod collision;
+#[doc(hidden)]
 pub mod conic;
 pub mod design;
 pub mod diagnose;

@@ -4,6 +4,7 @@
 mod common;
 
 mod base;
+mod collision;
 mod export;
 mod files;
 mod identities;

@@ -1,0 +1,158 @@
+//! Convex hull of points in space (Barber, Dobkin & Huhdanpaa, ACM TOMS 22(4), 1996).
+
+use nalgebra::Vector3;
+
+type V = Vector3<f64>;
+
+/// Convex hull: indices into the points it was made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hull {
+    /// triangles, counter-clockwise seen from outside
+    pub faces: Vec<[usize; 3]>,
+    /// corners, each once, ascending
+    pub corners: Vec<usize>,
+    /// volume, in the cube of the points' unit
+    pub volume: f64,
+}
+
+struct Face {
+    corners: [usize; 3],
+    normal: V,
+    offset: f64,
+    outside: Vec<usize>,
+    alive: bool,
+}
+
+impl Face {
+    fn new(points: &[V], corners: [usize; 3]) -> Self {
+        let [a, b, c] = corners.map(|i| points[i]);
+        let normal = (b - a).cross(&(c - a));
+        let normal = normal.try_normalize(0.0).unwrap_or_default();
+        Face {
+            corners,
+            normal,
+            offset: normal.dot(&a),
+            outside: Vec::new(),
+            alive: true,
+        }
+    }
+
+    fn height(&self, p: &V) -> f64 {
+        self.normal.dot(p) - self.offset
+    }
+}
+
+/// The hull of the points; `None` where they lie in a plane, or are fewer than four.
+pub fn hull(points: &[V]) -> Option<Hull> {
+    let size = points.iter().map(|p| p.amax()).fold(0.0, f64::max);
+    let eps = 1e-10 * size.max(1e-300);
+    let start = simplex(points, eps)?;
+    let centre = start.iter().map(|i| points[*i]).sum::<V>() / 4.0;
+    let mut faces: Vec<Face> = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]
+        .iter()
+        .map(|f| {
+            let mut corners = f.map(|i| start[i]);
+            if Face::new(points, corners).height(&centre) > 0.0 {
+                corners.swap(1, 2);
+            }
+            Face::new(points, corners)
+        })
+        .collect();
+    let assign = |faces: &mut [Face], from: usize, list: Vec<usize>| {
+        for i in list {
+            let highest = faces[from..]
+                .iter_mut()
+                .map(|f| (f.height(&points[i]), f))
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((h, f)) = highest
+                && h > eps
+            {
+                f.outside.push(i);
+            }
+        }
+    };
+    let all = (0..points.len()).filter(|i| !start.contains(i)).collect();
+    assign(&mut faces, 0, all);
+    let mut next = 0;
+    while next < faces.len() {
+        if !faces[next].alive || faces[next].outside.is_empty() {
+            next += 1;
+            continue;
+        }
+        let face = &faces[next];
+        let height = |i: &usize| face.height(&points[*i]);
+        let apex = *face
+            .outside
+            .iter()
+            .max_by(|a, b| height(a).total_cmp(&height(b)))?;
+        // every face that sees the apex goes; the edges between seen and unseen make new ones
+        let seen: Vec<usize> = (0..faces.len())
+            .filter(|&f| faces[f].alive && faces[f].height(&points[apex]) > eps)
+            .collect();
+        let mut edges = std::collections::BTreeSet::new();
+        let mut orphans = Vec::new();
+        for &f in &seen {
+            faces[f].alive = false;
+            orphans.append(&mut faces[f].outside);
+            let [a, b, c] = faces[f].corners;
+            for (i, k) in [(a, b), (b, c), (c, a)] {
+                if !edges.remove(&(k, i)) {
+                    edges.insert((i, k));
+                }
+            }
+        }
+        let from = faces.len();
+        faces.extend(
+            edges
+                .into_iter()
+                .map(|(i, k)| Face::new(points, [i, k, apex])),
+        );
+        orphans.retain(|i| *i != apex);
+        orphans.sort_unstable();
+        assign(&mut faces, from, orphans);
+        if faces.len() > 4 * points.len().max(1000) {
+            // compact, so that the search for seen faces stays short
+            faces.retain(|f| f.alive);
+            next = 0;
+        }
+    }
+    faces.retain(|f| f.alive);
+    let volume = faces
+        .iter()
+        .map(|f| {
+            let [a, b, c] = f.corners.map(|i| points[i] - centre);
+            a.dot(&b.cross(&c)) / 6.0
+        })
+        .sum();
+    let mut corners: Vec<usize> = faces.iter().flat_map(|f| f.corners).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    Some(Hull {
+        faces: faces.into_iter().map(|f| f.corners).collect(),
+        corners,
+        volume,
+    })
+}
+
+/// Four points that span a volume.
+fn simplex(points: &[V], eps: f64) -> Option<[usize; 4]> {
+    let furthest = |value: &dyn Fn(&V) -> f64| -> Option<(usize, f64)> {
+        let all = points.iter().map(value).enumerate();
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let (a, _) = furthest(&|p| -p.x)?;
+    let (b, length) = furthest(&|p| (p - points[a]).norm())?;
+    if length <= eps {
+        return None;
+    }
+    let along = (points[b] - points[a]) / length;
+    let (c, width) = furthest(&|p| (p - points[a]).cross(&along).norm())?;
+    if width <= eps {
+        return None;
+    }
+    let normal = (points[b] - points[a])
+        .cross(&(points[c] - points[a]))
+        .normalize();
+    let (d, height) = furthest(&|p| normal.dot(&(p - points[a])).abs())?;
+    (height > eps).then_some([a, b, c, d])
+}

@@ -1,0 +1,396 @@
+//! Distances, gradients, fits and clearances against brute force.
+
+use excite::collision::clearance::{Path, clearances};
+use excite::collision::scene::{Obstacle, Scene, Volume, poses};
+use excite::collision::{Pose, Shape, fit, hull, mesh, separation};
+use excite::robot::{Body, Inertia, Joint, Motion, Robot};
+use nalgebra::{Rotation3, Vector3};
+
+type V = Vector3<f64>;
+
+struct Random(u64);
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+    }
+    fn vector(&mut self, size: f64) -> V {
+        V::new(self.next(), self.next(), self.next()) * size
+    }
+    fn pose(&mut self, size: f64) -> Pose {
+        let axis = self.vector(3.0);
+        Pose {
+            rotation: Rotation3::new(axis).into_inner(),
+            position: self.vector(size),
+        }
+    }
+    fn shape(&mut self, kind: usize) -> Shape {
+        match kind {
+            0 => Shape::Sphere {
+                centre: self.vector(0.1),
+                radius: 0.05 + 0.04 * self.next(),
+            },
+            1 => Shape::Capsule {
+                from: self.vector(0.3),
+                to: self.vector(0.3),
+                radius: 0.05 + 0.04 * self.next(),
+            },
+            _ => Shape::Box {
+                pose: self.pose(0.2),
+                half: self.vector(0.1).abs() + V::repeat(0.05),
+            },
+        }
+    }
+}
+
+/// Distance of two cores by projected gradient over the cores' own coordinates.
+fn brute(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> f64 {
+    let point = |s: &Shape, at: &Pose, x: &[f64; 3]| match s {
+        Shape::Sphere { centre, .. } => at.apply(centre),
+        Shape::Capsule { from, to, .. } => at.apply(&(from + (to - from) * x[0])),
+        Shape::Box { pose, half } => {
+            let local = V::new(
+                (2.0 * x[0] - 1.0) * half.x,
+                (2.0 * x[1] - 1.0) * half.y,
+                (2.0 * x[2] - 1.0) * half.z,
+            );
+            at.apply(&pose.apply(&local))
+        }
+    };
+    let mut x = [0.5; 6];
+    let value = |x: &[f64; 6]| {
+        let p = point(a, at_a, &[x[0], x[1], x[2]]);
+        let q = point(b, at_b, &[x[3], x[4], x[5]]);
+        (p - q).norm()
+    };
+    // the problem is convex: cyclic golden steps along coordinates and pairs of them
+    let mut step = 0.5;
+    let mut best = value(&x);
+    while step > 1e-8 {
+        let mut better = false;
+        for i in 0..6 {
+            for k in 0..6 {
+                for (s, t) in [
+                    (1.0, 0.0),
+                    (-1.0, 0.0),
+                    (1.0, 1.0),
+                    (1.0, -1.0),
+                    (-1.0, 1.0),
+                    (-1.0, -1.0),
+                    (1.0, 0.5),
+                    (-1.0, 0.5),
+                    (1.0, -0.5),
+                    (-1.0, -0.5),
+                ] {
+                    let mut y = x;
+                    y[i] = (y[i] + s * step).clamp(0.0, 1.0);
+                    if i != k {
+                        y[k] = (y[k] + t * step).clamp(0.0, 1.0);
+                    }
+                    let v = value(&y);
+                    if v < best - 1e-15 {
+                        best = v;
+                        x = y;
+                        better = true;
+                    }
+                }
+            }
+        }
+        if !better {
+            step *= 0.5;
+        }
+    }
+    best - a.radius() - b.radius()
+}
+
+#[test]
+fn distances_agree_with_a_search_over_both_cores() {
+    let mut r = Random(7);
+    let mut apart = 0;
+    for k in 0..600 {
+        let (a, b) = (r.shape(k % 3), r.shape(k / 3 % 3));
+        let (pa, pb) = (r.pose(0.5), r.pose(0.5));
+        let s = separation(&a, &pa, &b, &pb);
+        let found = brute(&a, &pa, &b, &pb);
+        if found + a.radius() + b.radius() > 1e-4 {
+            apart += 1;
+            // the search is not exact where the valley is narrow: it can only be too far
+            assert!(
+                s.distance <= found + 1e-9 && s.distance > found - 2e-3,
+                "{k}: {} against {found}: {a:?} {b:?}",
+                s.distance
+            );
+            assert!((s.on_second - s.on_first - s.normal * s.distance).norm() < 1e-9);
+            let inside = |shape: &Shape, at: &Pose, p: &V| {
+                shape.signed_distance(&(at.rotation.transpose() * (p - at.position)))
+            };
+            assert!(
+                inside(&a, &pa, &s.on_first).abs() < 1e-8
+                    && inside(&b, &pb, &s.on_second).abs() < 1e-8,
+                "{k}"
+            );
+        }
+        let back = separation(&b, &pb, &a, &pa);
+        assert!(
+            (back.distance - s.distance).abs() < 1e-8,
+            "{k}: {} {}",
+            back.distance,
+            s.distance
+        );
+    }
+    assert!(apart > 300);
+}
+
+#[test]
+fn moving_along_the_normal_by_the_depth_parts_two_boxes() {
+    let mut r = Random(3);
+    let mut overlapping = 0;
+    for k in 0..1000 {
+        let (a, b) = (r.shape(2), r.shape(1 + k % 2));
+        let (pa, pb) = (r.pose(0.15), r.pose(0.15));
+        let s = separation(&a, &pa, &b, &pb);
+        if s.distance >= -b.radius() {
+            continue;
+        }
+        overlapping += 1;
+        let mut moved = pb;
+        moved.position += s.normal * (-s.distance + 1e-6);
+        let t = separation(&a, &pa, &b, &moved);
+        assert!(
+            t.distance > -1e-6 && t.distance < 1e-5,
+            "{k}: {} then {}",
+            s.distance,
+            t.distance
+        );
+    }
+    assert!(overlapping > 100, "{overlapping}");
+}
+
+fn arm(r: &mut Random, n: usize) -> Robot {
+    let mut robot = Robot::load("planar2").expect("bundled");
+    robot.bodies = (0..n)
+        .map(|k| {
+            let pose = r.pose(0.25);
+            Body {
+                name: format!("link{k}"),
+                joint_name: format!("joint{k}"),
+                parent: k.checked_sub(1),
+                motion: if k == 3 {
+                    Motion::Prismatic
+                } else {
+                    Motion::Revolute
+                },
+                axis: r.vector(1.0).normalize(),
+                rotation: pose.rotation,
+                position: pose.position,
+                inertia: Inertia([0.0; 10]),
+                merged: vec![],
+                coordinate: k,
+                ratio: 1.0,
+                offset: 0.0,
+                meant: None,
+            }
+        })
+        .collect();
+    robot.joints = (0..n)
+        .map(|k| {
+            let mut joint = Joint::new(&format!("joint{k}"), robot.bodies[k].motion);
+            joint.limits.position = [-0.5, 0.5];
+            joint
+        })
+        .collect();
+    robot
+}
+
+fn scene(r: &mut Random, robot: &Robot) -> Scene {
+    let mut s = Scene {
+        margin: 0.0,
+        ..Scene::default()
+    };
+    for b in 0..robot.bodies.len() {
+        s.volumes.push(Volume {
+            link: format!("link{b}"),
+            body: Some(b),
+            shape: r.shape(1),
+        });
+    }
+    s.volumes.push(Volume {
+        link: "base".into(),
+        body: None,
+        shape: r.shape(2),
+    });
+    s.obstacles.push(Obstacle::Plane {
+        name: "floor".into(),
+        normal: V::z(),
+        offset: -0.3,
+    });
+    s.obstacles.push(Obstacle::Solid {
+        name: "ball".into(),
+        shape: Shape::Sphere {
+            centre: V::new(0.5, 0.2, 0.1),
+            radius: 0.1,
+        },
+    });
+    s.pairs = s.all_pairs(robot, |_, _| false);
+    s
+}
+
+#[test]
+fn gradients_agree_with_differences() {
+    let mut r = Random(11);
+    let mut checked = 0;
+    for _ in 0..20 {
+        let robot = arm(&mut r, 6);
+        let scene = scene(&mut r, &robot);
+        let q: Vec<f64> = (0..6).map(|_| r.next()).collect();
+        let mut at = Vec::new();
+        poses(&robot, &q, &mut at);
+        for pair in &scene.pairs {
+            let s = scene.separation(pair, &at);
+            if s.distance.abs() < 1e-3 {
+                continue;
+            }
+            let mut g = vec![0.0; 6];
+            scene.gradient(&robot, pair, &s, &at, &mut g);
+            for j in 0..6 {
+                let value = |h: f64| {
+                    let mut x = q.clone();
+                    x[j] += h;
+                    let mut at = Vec::new();
+                    poses(&robot, &x, &mut at);
+                    scene.separation(pair, &at).distance
+                };
+                let h = 1e-5;
+                let (plus, minus) = (value(h), value(-h));
+                // where the nearest point jumps there is no derivative
+                if (plus + minus - 2.0 * s.distance).abs() > 1e-7 {
+                    continue;
+                }
+                let d = (plus - minus) / (2.0 * h);
+                assert!(
+                    (d - g[j]).abs() < 2e-5,
+                    "{:?} joint {j}: {d} against {}",
+                    scene.names(pair),
+                    g[j]
+                );
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 1500, "{checked}");
+}
+
+struct Waves {
+    a: Vec<[f64; 3]>,
+}
+impl Path for Waves {
+    fn position(&self, t: f64, q: &mut [f64]) {
+        for (q, a) in q.iter_mut().zip(&self.a) {
+            *q = a[0] * (a[1] * t + a[2]).sin() * 0.5;
+        }
+    }
+    fn speed(&self, _: f64, _: f64, v: &mut [f64]) {
+        for (v, a) in v.iter_mut().zip(&self.a) {
+            *v = (0.5 * a[0] * a[1]).abs();
+        }
+    }
+    fn duration(&self) -> f64 {
+        4.0
+    }
+}
+
+#[test]
+fn no_instant_is_nearer_than_the_bound() {
+    let mut r = Random(5);
+    for _ in 0..5 {
+        let robot = arm(&mut r, 6);
+        let scene = scene(&mut r, &robot);
+        let path = Waves {
+            a: (0..6)
+                .map(|_| [1.0, 2.0 + r.next(), 3.0 * r.next()])
+                .collect(),
+        };
+        let found = clearances(&robot, &scene, &path, 200, 0.002, 1e-4);
+        let mut q = vec![0.0; 6];
+        let mut at = Vec::new();
+        let mut least = vec![f64::INFINITY; scene.pairs.len()];
+        for k in 0..20_000 {
+            path.position(4.0 * f64::from(k) / 20_000.0, &mut q);
+            poses(&robot, &q, &mut at);
+            for (l, p) in least.iter_mut().zip(&scene.pairs) {
+                *l = l.min(scene.separation(p, &at).distance);
+            }
+        }
+        for (c, l) in found.iter().zip(&least) {
+            assert!(c.bound <= *l + 1e-12 && c.bound >= l - 0.01, "{c:?} {l}");
+            assert!(c.met >= l - 1e-3);
+        }
+    }
+}
+
+#[test]
+fn a_fit_holds_every_corner_and_is_tight() {
+    // a drum of 24 sides, 0.1 m radius, 0.4 m long, turned away from the axes
+    let turn = Rotation3::new(V::new(0.4, -0.3, 0.8));
+    let mut m = mesh::Mesh::default();
+    for z in [-0.2, 0.2] {
+        for k in 0..24 {
+            let a = f64::from(k) * std::f64::consts::TAU / 24.0;
+            m.points
+                .push(turn * V::new(0.1 * a.cos(), 0.1 * a.sin(), z));
+        }
+    }
+    for k in 0..24 {
+        let n = (k + 1) % 24;
+        m.triangles.extend([[k, n, 24 + k], [n, 24 + n, 24 + k]]);
+    }
+    for k in 1..23 {
+        m.triangles.extend([[0, k + 1, k], [24, 24 + k, 25 + k]]);
+    }
+    assert!(m.closed());
+    let h = hull::hull(&m.points).expect("a volume");
+    let area = 12.0 * 0.01 * (std::f64::consts::TAU / 24.0).sin();
+    assert!((h.volume - area * 0.4).abs() < 1e-9, "{}", h.volume);
+    let f = fit::fit(&m, 4, 1.6);
+    for p in &m.points {
+        assert!(f.shapes.iter().any(|s| s.signed_distance(p) <= 0.0));
+    }
+    assert!(f.volume < 1.7 * f.hull, "{}", f.volume / f.hull);
+}
+
+#[test]
+fn meshes_are_read_and_refused() {
+    let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf 2 3 4\nf 3 1 -1\n";
+    let m = mesh::read("a.OBJ", obj).expect("a tetrahedron");
+    assert_eq!(
+        (m.points.len(), m.triangles.len(), m.closed()),
+        (4, 4, true)
+    );
+    let text = b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid";
+    assert_eq!(
+        mesh::read("a.stl", text)
+            .expect("one triangle")
+            .triangles
+            .len(),
+        1
+    );
+    assert!(mesh::read("a.stl", b"").is_err());
+    assert!(mesh::read("a.ply", b"").unwrap_err().contains("STL or OBJ"));
+    assert!(
+        mesh::read("a.obj", b"v 0 0 0\nf 1 2 3\n")
+            .unwrap_err()
+            .contains("line 2")
+    );
+    let mut binary = vec![0; 84];
+    binary[80] = 1;
+    binary.extend([0; 50]);
+    binary[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(
+        mesh::read("a.stl", &binary)
+            .unwrap_err()
+            .contains("triangle 1")
+    );
+}
