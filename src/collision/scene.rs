@@ -1,8 +1,7 @@
 //! Volumes of a robot and of its surroundings, and the pairs of them that must stay apart.
 //!
-//! A pair is a volume of one body and a volume of another body, of the base, or an obstacle. Pairs that
-//! say nothing are left out: bodies joined by a joint, pairs that overlap in every sampled posture, and
-//! pairs that the user names ([`Scene::ignore`]).
+//! A pair is a volume of one body and a volume of another body, of the base, or an obstacle. Bodies that a
+//! joint joins and pairs that the user names are left out.
 
 use super::distance::{Separation, separation, separation_from_plane};
 use super::shape::{Pose, Shape};
