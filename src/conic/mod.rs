@@ -42,7 +42,7 @@ use clarabel::solver::{
 };
 use faer::MatRef;
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use solution::Cone;
 pub use solution::{Solution, Status};
 use sparse::{Rows, compress, flaw};

@@ -42,7 +42,7 @@ struct Reduced {
 ///
 /// # Errors
 /// Poses that cannot be reached.
-pub fn tighten(data: &mut Data, effects: &[Box<dyn Effect>]) -> crate::Result<()> {
+pub fn tighten(data: &mut Data, effects: &[Box<dyn Effect>]) -> crate::error::Result<()> {
     if data.plant.prior() == Prior::Identified {
         let evidence = Evidence::new(data, 1.0);
         let phi = evidence.parameters(&[], &evidence.fit(&[]));

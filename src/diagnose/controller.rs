@@ -148,7 +148,7 @@ struct Signals {
 }
 
 impl Signals {
-    fn new(data: &Data, phi: &[f64]) -> crate::Result<Self> {
+    fn new(data: &Data, phi: &[f64]) -> crate::error::Result<Self> {
         let n = data.joints();
         let fitted: Vec<usize> = (0..data.records.len())
             .filter(|k| data.records[*k].fit)
@@ -212,7 +212,7 @@ impl Signals {
             .par_iter()
             .zip(&coordinates)
             .map(|(x, errors)| pushed(data.plant, x, errors))
-            .collect::<crate::Result<Vec<_>>>()?;
+            .collect::<crate::error::Result<Vec<_>>>()?;
         // rows of one actuator in the fitted records, each limited to the band of the positions; what
         // was not measured counts for nothing
         let in_band = |column: &dyn Fn(usize, usize) -> Vec<f64>| -> Vec<f64> {
@@ -360,7 +360,7 @@ fn pushed(
     plant: &Plant,
     x: &Samples,
     errors: &[[Vec<f64>; 3]],
-) -> crate::Result<[Vec<Vec<f64>>; 3]> {
+) -> crate::error::Result<[Vec<Vec<f64>>; 3]> {
     let m = x.dof;
     let mut nominal = Dynamics::nominal(plant);
     let rest = DVector::zeros(m);

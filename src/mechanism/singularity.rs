@@ -125,7 +125,7 @@ impl Mechanism {
             qdd: vec![0.0; m],
         };
         if let Some(why) = self.problem(x) {
-            return Err(crate::Error::Infeasible(format!(
+            return Err(crate::error::Error::Infeasible(format!(
                 "{}: the pose cannot be taken: {why}",
                 self.robot.name
             )));

@@ -35,7 +35,7 @@ impl<'a> Context<'a> {
     ///
     /// # Errors
     /// Poses that cannot be reached.
-    pub fn new(data: &'a Data<'a>, phi: Vec<f64>) -> crate::Result<Self> {
+    pub fn new(data: &'a Data<'a>, phi: Vec<f64>) -> crate::error::Result<Self> {
         let model = data.model_torque(&phi);
         let rigid = data.rigid_torque(&phi);
         let peak = rigid

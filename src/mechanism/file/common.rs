@@ -76,7 +76,7 @@ macro_rules! mechanism_file {
             $($(#[$field_doc])* $field: $type,)*
         }
         impl $file {
-            fn parse(source: crate::robot::file::Text) -> crate::Result<Self> {
+            fn parse(source: crate::robot::file::Text) -> crate::error::Result<Self> {
                 toml::from_str(source.text).map_err(|e| source.toml_error(&e))
             }
             fn head<'a>(
