@@ -7,6 +7,7 @@ use super::column::Column;
 use super::noise::{Noise, ORDER};
 use super::prior::{self, Closeness, factors};
 use super::rigid::{inertia, rigid};
+use super::thresholds::THRESHOLDS as T;
 use super::window::{averaged, fine, sign};
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -229,7 +230,7 @@ impl<'a> Data<'a> {
                 // friction of one drive acts on others, too: left as it is
                 continue;
             }
-            let column = self.own(j, |_, v| sign(v, 1e-3 * self.speed[j]));
+            let column = self.own(j, |_, v| sign(v, T.reversals.sharp * self.speed[j]));
             let to = self.w[j].col_mut(c);
             let to = to.try_as_col_major_mut().expect("column major");
             to.as_slice_mut().copy_from_slice(&column);
@@ -293,7 +294,7 @@ impl<'a> Data<'a> {
     /// A modelled signal of all records as the torque channel would show it: passes of the kernel
     /// `[c/2, 1 − c, c/2]` until their variances sum to the window's.
     pub fn windowed(&self, x: &[f64]) -> Vec<f64> {
-        let passes = (self.window / 0.3).ceil() as usize;
+        let passes = (self.window / T.window.pass).ceil() as usize;
         let mut x = x.to_vec();
         if passes == 0 {
             return x;

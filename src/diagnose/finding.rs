@@ -3,7 +3,7 @@
 use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value};
 use super::evidence::{Evidence, Projected};
 use super::interval;
-use super::thresholds::THRESHOLDS;
+use super::thresholds::THRESHOLDS as T;
 use super::verdict::Decision;
 
 /// One effect in the result.
@@ -54,7 +54,7 @@ pub struct Finding {
 impl Finding {
     /// Whether it is claimed: it belongs to the set, and is at least as likely there as not.
     pub fn is_claim(&self) -> bool {
-        self.member && self.confidence >= THRESHOLDS.confidence.claim
+        self.member && self.confidence >= T.confidence.claim
     }
 }
 
@@ -114,7 +114,7 @@ fn members(
         let effect = effects[c.effect].as_ref();
         let card = effect.card();
         let mut same: Vec<&'static str> = Vec::new();
-        for r in m.rivals.iter().filter(|r| r.weight > 0.25) {
+        for r in m.rivals.iter().filter(|r| r.weight > T.rivals.same) {
             let rival = effects[r.effect].card().name;
             if rival != card.name && !same.contains(&rival) {
                 same.push(rival);
@@ -157,7 +157,11 @@ fn rivals(
         for r in &of.rivals {
             let (effect, card) = (effects[r.effect].as_ref(), effects[r.effect].card());
             let known = findings.iter().any(|f| f.effect == card.name);
-            if seen.len() >= 4 || r.weight < 0.01 || seen.contains(&r.effect) || known {
+            if seen.len() >= T.rivals.places
+                || r.weight < T.rivals.listed
+                || seen.contains(&r.effect)
+                || known
+            {
                 continue;
             }
             seen.push(r.effect);
@@ -171,7 +175,7 @@ fn rivals(
                 place: r.place,
                 shape: r.shape.clone(),
                 eta: r.eta.clone(),
-                confidence: (main.confidence * r.weight).min(0.49),
+                confidence: (main.confidence * r.weight).min(T.rivals.believed),
                 explains: main.explains * (1.0 - r.loss).clamp(0.0, 1.0),
                 interval: main.interval.map(|v| v * (1.0 - r.loss).clamp(0.0, 1.0)),
                 holdout: main.holdout * (1.0 - r.loss).clamp(0.0, 1.0),
@@ -182,7 +186,7 @@ fn rivals(
                     cx,
                     &estimate(r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
                 ),
-                same: if r.weight > 0.25 {
+                same: if r.weight > T.rivals.same {
                     vec![main.effect]
                 } else {
                     Vec::new()

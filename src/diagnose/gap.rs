@@ -68,8 +68,8 @@ pub fn excess(record: &Series, e: &[f64]) -> (f64, f64) {
     let slow = match between_periods(record, e) {
         Some(x) => {
             let s = spectrum(&x);
-            let low = ((super::noise::SLOW * 2.0 * record.dt * LINES as f64) as usize)
-                .clamp(1, LINES / 4);
+            let low =
+                ((T.noise.slow * 2.0 * record.dt * LINES as f64) as usize).clamp(1, LINES / 4);
             let mut rest = s[low..].to_vec();
             rest.sort_by(f64::total_cmp);
             let level = rest[rest.len() / 2].max(1.0);

@@ -14,6 +14,7 @@
 use super::catalogue::{Context, Effect, Estimate};
 use super::evidence::Evidence;
 use super::finding::Finding;
+use super::thresholds::THRESHOLDS as T;
 use crate::error::{Warning, WarningKind};
 use crate::export::{self, FORMATS, Format, Remark};
 use crate::identify::consistent::{self, Prior};
@@ -109,7 +110,7 @@ fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> Vec<Warning> {
                 .sum();
             let rows = (evidence.data.fitted * evidence.data.joints()).max(1) as f64;
             let rms = (cost / rows).sqrt();
-            match rms > SEEN {
+            match rms > T.improved.seen {
                 true => vec![Warning::new(
                     WarningKind::InertiaImpossible,
                     &robot.name,
@@ -130,6 +131,3 @@ fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> Vec<Warning> {
         )],
     }
 }
-
-/// Change of the torque, in units of its noise, that is worth a warning.
-const SEEN: f64 = 0.1;

@@ -69,6 +69,7 @@ pub use settings::Settings;
 pub use traces::Trace;
 pub use verdict::Verdict;
 
+use self::thresholds::THRESHOLDS as T;
 use crate::error::{Error, Result};
 use crate::log::{self, Experiment, Purpose};
 use crate::plant::Plant;
@@ -108,7 +109,7 @@ pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
         let wider = e.project(&[data.curvature(&model)]);
         let found = e.fit(&[&wider]).eta[0];
         drop(e);
-        data.window = (data.window + found).clamp(0.0, 3.0);
+        data.window = (data.window + found).clamp(0.0, T.window.widest);
         if pass == 0 {
             let residual = data.gap_to(&model);
             data.limit_excess(&residual);

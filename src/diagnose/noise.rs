@@ -1,21 +1,20 @@
 //! Noise of the measured torque, and the filters that make it white.
 //!
 //! The spectrum `S_τ(f)` of the noise of each actuator comes from the scatter between periods of a
-//! repeating motion; slow changes (below [`SLOW`]) count as a gap and not as noise, so the spectrum is
+//! repeating motion; slow changes (below `noise.slow`) count as a gap and not as noise, so the spectrum is
 //! continued flat below. To it comes what the resolution of the positions leaves unknown of the
 //! acceleration, `Σ_k M_jk² (2πf)⁴ S_q,k(f)`, but never more than the residual of the refitted model
 //! shows. A linear predictor of that spectrum (Levinson-Durbin) whitens every signal and every column
 //! alike, so that all tests count independent samples (Pintelon & Schoukens 2012, ch. 9).
 
+use super::thresholds::THRESHOLDS as T;
 use crate::signals::series::Series;
 use std::f64::consts::PI;
 
-/// Frequency below which differences between periods are not noise, Hz.
-pub const SLOW: f64 = 4.0;
 /// Order of the whitening filters.
-pub const ORDER: usize = 12;
+pub const ORDER: usize = T.noise.order;
 /// Lines of a spectrum between 0 and half the sampling rate.
-pub const LINES: usize = 128;
+pub const LINES: usize = T.noise.lines;
 
 /// One-sided power of a signal on [`LINES`]` + 1` lines, such that their mean is its variance.
 pub fn spectrum(x: &[f64]) -> Vec<f64> {
@@ -93,10 +92,13 @@ pub struct Noise {
     pub excess: f64,
 }
 
-/// Flat continuation below [`SLOW`] of a spectrum of noise between periods.
+/// Flat continuation below `noise.slow` of a spectrum of noise between periods.
 fn flat_below(s: &mut [f64], dt: f64) {
     let of = |f: f64| ((f * 2.0 * dt) * LINES as f64).round() as usize;
-    let (a, b) = (of(SLOW).min(LINES), of(3.0 * SLOW).clamp(2, LINES));
+    let (a, b) = (
+        of(T.noise.slow).min(LINES),
+        of(T.noise.level * T.noise.slow).clamp(2, LINES),
+    );
     if a + 1 >= b {
         return;
     }
@@ -104,15 +106,18 @@ fn flat_below(s: &mut [f64], dt: f64) {
     band.sort_by(f64::total_cmp);
     let level = band[band.len() / 2];
     for v in &mut s[..a] {
-        *v = v.min(level).max(0.5 * level);
+        *v = v.min(level).max(T.noise.flat * level);
     }
     // single lines that stand out are a disturbance with a frequency of its own
     for k in a..=LINES {
-        let (lo, hi) = (k.saturating_sub(6).max(a), (k + 6).min(LINES));
+        let (lo, hi) = (
+            k.saturating_sub(T.noise.about).max(a),
+            (k + T.noise.about).min(LINES),
+        );
         let mut near = s[lo..=hi].to_vec();
         near.sort_by(f64::total_cmp);
         let middle = near[near.len() / 2];
-        if s[k] > 4.0 * middle {
+        if s[k] > T.noise.lone * middle {
             s[k] = middle;
         }
     }
@@ -137,7 +142,7 @@ impl Noise {
 
     /// No more than the robot file states: what is beyond is not noise but a gap that does not repeat.
     pub fn limit(&mut self, stated: Option<f64>) {
-        let Some(stated) = stated.filter(|s| *s > 0.0 && self.std > 1.5 * s) else {
+        let Some(stated) = stated.filter(|s| *s > 0.0 && self.std > T.noise.stated * s) else {
             return;
         };
         let scale = (stated / self.std).powi(2);
@@ -149,7 +154,7 @@ impl Noise {
     /// From a residual: its power above `band`, taken as flat below.
     pub fn from_residual(x: &[f64], dt: f64, band: f64) -> Self {
         let mut s = spectrum(x);
-        let from = ((band * 2.0 * dt * LINES as f64).ceil() as usize).min(LINES - 8);
+        let from = ((band * 2.0 * dt * LINES as f64).ceil() as usize).min(LINES - T.noise.last);
         let mut high = s[from..LINES].to_vec();
         high.sort_by(f64::total_cmp);
         let level = high[high.len() / 2];
@@ -160,7 +165,7 @@ impl Noise {
     fn new(mut torque: Vec<f64>, source: Source) -> Self {
         let power = torque.iter().sum::<f64>() / torque.len() as f64;
         for v in &mut torque {
-            *v = v.max(1e-3 * power).max(1e-300);
+            *v = v.max(T.noise.least * power).max(1e-300);
         }
         let mut noise = Noise {
             std: power.sqrt(),

@@ -6,6 +6,7 @@
 
 use super::data::Data;
 use super::noise::{LINES, Noise, Source, between_periods, spectrum};
+use super::thresholds::THRESHOLDS as T;
 use crate::signals::series::Series;
 
 impl Data<'_> {
@@ -27,7 +28,7 @@ impl Data<'_> {
         // without repetition: the torque above the band of the motion
         let longest = self.records.iter().max_by_key(|r| r.count);
         let r = longest.expect("there are records");
-        Noise::from_residual(r.torque(j), r.dt, 2.0 * r.band)
+        Noise::from_residual(r.torque(j), r.dt, T.noise.above * r.band)
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.
@@ -40,7 +41,7 @@ impl Data<'_> {
             let variance = (self.inertia[j] * r.position_noise[j]).powi(2) / records.len() as f64;
             for (l, out) in out.iter_mut().enumerate() {
                 let f = l as f64 / (2.0 * r.dt * LINES as f64);
-                *out += variance * (2.0 * std::f64::consts::PI * f.min(60.0)).powi(4);
+                *out += variance * (2.0 * std::f64::consts::PI * f.min(T.noise.resolved)).powi(4);
             }
         }
         out
@@ -51,7 +52,7 @@ impl Data<'_> {
         for j in 0..self.joints() {
             if self.noise[j].source != Source::Periods {
                 let r = &self.records[0];
-                let (dt, band) = (r.dt, 2.0 * r.band);
+                let (dt, band) = (r.dt, T.noise.above * r.band);
                 let mut e = residual[j][..self.fitted].to_vec();
                 let fits = self.records.iter().filter(|r| r.fit);
                 let sound: usize = fits.map(Series::sound).sum();
@@ -79,7 +80,10 @@ impl Data<'_> {
             let excess: Vec<f64> = (0..=LINES)
                 .map(|l| {
                     // median of neighbours: a line of its own is a gap, not noise
-                    let (lo, hi) = (l.saturating_sub(5), (l + 5).min(LINES));
+                    let (lo, hi) = (
+                        l.saturating_sub(T.noise.excess),
+                        (l + T.noise.excess).min(LINES),
+                    );
                     let mut near: Vec<f64> = seen[lo..=hi].iter().map(|v| v / weight).collect();
                     near.sort_by(f64::total_cmp);
                     let seen = near[near.len() / 2] - self.noise[j].torque[l];

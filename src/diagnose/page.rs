@@ -4,6 +4,7 @@ use super::controller::Kind;
 use super::finding::Finding;
 use super::next::Proposal;
 use super::result::Diagnosis;
+use super::thresholds::THRESHOLDS as T;
 use super::verdict::Verdict;
 use crate::report::format::{percent, significant};
 use crate::report::html::{Section, Tone, details, figure, legend, page, table, tiles};
@@ -48,7 +49,11 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         ),
         Verdict::Unknown => (
             Tone::Bad,
-            match d.findings.first().filter(|f| f.confidence > 0.15) {
+            match d
+                .findings
+                .first()
+                .filter(|f| f.confidence > T.confidence.nearest)
+            {
                 Some(f) => format!(
                     "Unknown: there is a gap that no effect of the catalogue explains with confidence. The nearest is {} \
                      ({} sure); see below what could tell.",

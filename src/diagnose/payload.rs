@@ -8,6 +8,7 @@
 
 use super::column::Column;
 use super::data::Data;
+use super::thresholds::THRESHOLDS as T;
 use super::window::averaged;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{self, Payload, Purpose};
@@ -18,12 +19,6 @@ use nalgebra::Matrix3;
 
 /// Ten parameters of a load about the origin of the frame of the body that carries it.
 pub type Load = [f64; 10];
-
-/// An unknown load has a standard deviation of the mass of the whole robot, of this at least, kg: wide
-/// enough to leave it free.
-const LIGHTEST: f64 = 10.0;
-/// Lever of that mass in the deviations of first moments and, squared, of the tensor, m.
-const LEVER: f64 = 0.5;
 
 /// Names of the free parameters.
 const NAMES: [&str; 10] = [
@@ -137,7 +132,7 @@ impl Data<'_> {
                     1..=3 => 1,
                     _ => 2,
                 };
-                mass.max(LIGHTEST) * LEVER.powi(moment)
+                mass.max(T.load.lightest) * T.load.lever.powi(moment)
             };
             let free = NAMES.iter().zip(columns).enumerate();
             let free = free.map(|(c, (name, rows))| {
@@ -175,7 +170,7 @@ impl Data<'_> {
     pub fn free_load_in_words(&self, phi: &[f64]) -> Option<String> {
         let at = self.free_load?;
         let m = phi[at];
-        Some(match m.abs() > 1e-6 {
+        Some(match m.abs() > T.load.least {
             true => format!(
                 "it carries an unknown load, estimated beside the effects: {m:.3} kg at ({:.3}, {:.3}, {:.3}) m",
                 phi[at + 1] / m,

@@ -1,6 +1,7 @@
 //! How far the parameters of a nominal model may be off: what is ordinary for a model of its origin.
 
 use super::noise::Noise;
+use super::thresholds::THRESHOLDS as T;
 use crate::plant::{self, Parameter, Plant};
 use crate::robot::{JointTerm, Prior};
 
@@ -24,7 +25,8 @@ pub fn factors(parameters: &[Parameter], closeness: Closeness) -> Vec<f64> {
 /// the largest speeds of the actuators.
 pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &[f64]) -> Vec<f64> {
     let robot = plant.robot();
-    let identified = plant.prior() == Prior::Identified;
+    let cad = usize::from(plant.prior() != Prior::Identified);
+    let of = |deviations: [f64; 2]| deviations[cad];
     let heaviest = robot
         .bodies
         .iter()
@@ -42,7 +44,7 @@ pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &
             .fold(0.0, f64::max);
         let m = body.inertia.mass().max(1e-9);
         let about = (body.inertia.tensor().trace().max(0.0) / (2.0 * m)).sqrt();
-        next.max(about).max(0.03)
+        next.max(about).max(T.prior.short)
     };
     parameters
         .iter()
@@ -51,17 +53,13 @@ pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &
                 let m = robot.bodies[body]
                     .inertia
                     .mass()
-                    .max(0.02 * heaviest)
-                    .max(1e-3);
+                    .max(T.prior.lightest * heaviest)
+                    .max(T.prior.light);
                 let l = size(body);
-                let [mass, first, second] = match identified {
-                    true => [0.015, 0.006, 0.008],
-                    false => [0.2, 0.1, 0.12],
-                };
                 match k {
-                    0 => mass * m,
-                    1..=3 => first * m * l,
-                    _ => second * m * l * l,
+                    0 => of(T.prior.mass) * m,
+                    1..=3 => of(T.prior.first) * m * l,
+                    _ => of(T.prior.second) * m * l * l,
                 }
             }
             plant::Column::Term { joint, term } => {
@@ -70,18 +68,16 @@ pub fn spread(plant: &Plant, parameters: &[Parameter], noise: &[Noise], speed: &
                 let j = actuated.iter().position(|a| *a == joint);
                 let noise = j.map_or(0.0, |j| noise[j].std);
                 let speed = j.map_or(1.0, |j| speed[j]);
-                let friction = terms[2].abs() + 0.3 * terms[1].abs() * speed;
-                match (term, identified) {
-                    (JointTerm::Armature, true) => 0.06 * value,
-                    (JointTerm::Armature, false) => 0.3 * value,
-                    (JointTerm::Viscous, true) => 0.15 * value,
-                    (JointTerm::Viscous, false) => 0.4 * value,
-                    (JointTerm::Coulomb, true) => 0.06 * value,
-                    (JointTerm::Coulomb, false) => 0.35 * value,
-                    (JointTerm::Offset, true) => (0.04 * friction).max(0.3 * noise),
-                    (JointTerm::Offset, false) => (0.2 * friction).max(noise),
+                let friction = terms[2].abs() + T.prior.at_speed * terms[1].abs() * speed;
+                match term {
+                    JointTerm::Armature => of(T.prior.armature) * value,
+                    JointTerm::Viscous => of(T.prior.viscous) * value,
+                    JointTerm::Coulomb => of(T.prior.coulomb) * value,
+                    JointTerm::Offset => {
+                        (of(T.prior.offset) * friction).max(of(T.prior.offset_noise) * noise)
+                    }
                 }
-                .max(0.02 * noise)
+                .max(T.prior.noise * noise)
             }
             // each states its own
             plant::Column::Nuisance => 0.0,

@@ -3,12 +3,16 @@
 //! Controllers average torque over a triangle of plus and minus one sample. A smooth signal is changed by
 //! `Δ² ẍ / 12`; what is not smooth is evaluated on [`FINE`] sub-steps a sample.
 
+use super::thresholds::THRESHOLDS as T;
+
 /// Sub-steps of a sampling interval over which what is not smooth is averaged.
-pub const FINE: usize = 4;
+pub const FINE: usize = T.window.fine;
 
 /// Smooth sign.
 pub fn sign(v: f64, width: f64) -> f64 {
-    (v / width).clamp(-20.0, 20.0).tanh()
+    (v / width)
+        .clamp(-T.window.saturated, T.window.saturated)
+        .tanh()
 }
 
 /// A smooth signal averaged over a triangle of plus and minus one sample: `x + Δ² ẍ / 12`.

@@ -48,12 +48,29 @@ fn shown(value: &Value) -> String {
     }
 }
 
+/// The files that the constants stand in.
+fn sources() -> Vec<PathBuf> {
+    let mut files = vec![root().join("src/diagnose/thresholds.rs")];
+    files.extend(inside("src/diagnose/thresholds"));
+    files
+}
+
+/// The files of a folder, in order.
+fn inside(folder: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(root().join(folder)).expect("a folder of the sources");
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
 /// The table of `docs/diagnosis-method.md`.
 fn table() -> String {
-    let source = read(&root().join("src/diagnose/thresholds.rs"));
-    let fields = fields(&source);
+    let texts: Vec<String> = sources().iter().map(|f| read(f)).collect();
+    let fields = fields(&texts.concat());
     let all = serde_json::to_value(THRESHOLDS).expect("numbers");
     let groups = all.as_object().expect("a struct");
+    let named = fields.iter().filter(|f| f[0] == "Thresholds").count();
+    assert_eq!(named, groups.len());
     let mut rows = vec![
         "| constant | value | unit | meaning | source |".to_string(),
         "|---|---|---|---|---|".to_string(),
@@ -149,15 +166,18 @@ fn the_scanner_sees_numbers_and_nothing_else() {
 /// Numbers that decide nothing: 1e-9, 1e-12 and 1e-300 keep divisions away from zero, 100 makes percents.
 const HARMLESS: [f64; 8] = [0.0, 1.0, 2.0, 0.5, 1e-9, 1e-12, 1e-300, 100.0];
 
-/// Fails for each number of a file that `counts` and is not harmless.
-fn none_left(file: &Path, counts: impl Fn(&str) -> bool) {
-    for (line, number) in numbers(&read(file)).into_iter().filter(|n| counts(&n.1)) {
+/// Fails for each number of a file, tests left out, that `counts` and is neither harmless nor one of a
+/// `formula`.
+fn none_left(file: &Path, formula: &[f64], counts: impl Fn(&str) -> bool) {
+    let text = read(file);
+    let code = text.split("#[cfg(test)]").next().unwrap_or("");
+    for (line, number) in numbers(code).into_iter().filter(|n| counts(&n.1)) {
         let value: f64 = number
             .parse()
             .unwrap_or_else(|_| panic!("{number} in {}", file.display()));
         assert!(
-            HARMLESS.contains(&value),
-            "{}:{line}: {number} belongs into src/diagnose/thresholds.rs",
+            HARMLESS.contains(&value) || formula.contains(&value),
+            "{}:{line}: {number} belongs into src/diagnose/thresholds",
             file.display()
         );
     }
@@ -165,15 +185,14 @@ fn none_left(file: &Path, counts: impl Fn(&str) -> bool) {
 
 #[test]
 fn no_bare_number_is_left_in_the_verdict() {
-    let folder = root().join("src/diagnose/verdict");
     let mut files = vec![root().join("src/diagnose/verdict.rs")];
-    let entries = std::fs::read_dir(folder).expect("the folder of the verdict");
-    files.extend(entries.map(|e| e.expect("an entry").path()));
+    files.extend(inside("src/diagnose/verdict"));
     assert!(files.len() > 5);
-    files.iter().for_each(|f| none_left(f, |_| true));
+    files.iter().for_each(|f| none_left(f, &[], |_| true));
 }
 
-/// Whole numbers there are lengths of arrays and indices.
+/// Whole numbers there are lengths of arrays and indices. Formulas have numbers of their own: the golden
+/// ratio, the polynomial of Hermite, the mean over a triangle.
 #[test]
 fn no_bare_fraction_is_left_in_the_stages_about_the_verdict() {
     let stages = [
@@ -186,9 +205,25 @@ fn no_bare_fraction_is_left_in_the_stages_about_the_verdict() {
         "next",
         "next/trial",
         "next/motions",
+        "prior",
+        "reversal",
+        "noise",
+        "noise_floor",
+        "window",
+        "finding",
+        "decoy",
+        "data",
+        "payload",
+        "improve",
     ];
+    let formulas: [f64; 4] = [0.618_033_988_749_895, 3.0, 10.0, 12.0];
     for stage in stages {
         let file = root().join(format!("src/diagnose/{stage}.rs"));
-        none_left(&file, |n| n.contains(['.', 'e']));
+        let formula: &[f64] = match stage {
+            "decoy" => &formulas[..1],
+            "window" => &formulas[1..],
+            _ => &[],
+        };
+        none_left(&file, formula, |n| n.contains(['.', 'e']));
     }
 }

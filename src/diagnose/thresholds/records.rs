@@ -1,0 +1,216 @@
+//! What is taken from the records and the robot file before any effect: noise, window, reversals, prior.
+
+/// Noise of the measured torque.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Noise {
+    /// Frequency below which differences between periods are not noise but slow changes. Unit: Hz. Source: by hand.
+    pub slow: f64,
+    /// Order of the whitening filters. Unit: count. Source: by hand.
+    pub order: usize,
+    /// Lines of a spectrum between 0 and half the sampling rate. Unit: count. Source: by hand.
+    pub lines: usize,
+    /// Up to how many times `slow` the level is taken that a spectrum is continued with below it. Unit: ratio.
+    /// Source: by hand.
+    pub level: f64,
+    /// Least power of a line below `slow`, over that level. Unit: share. Source: by hand.
+    pub flat: f64,
+    /// Line over the median about it above which it is a disturbance with a frequency of its own. Unit: ratio.
+    /// Source: by hand.
+    pub lone: f64,
+    /// Lines to either side that this median is taken of. Unit: count. Source: by hand.
+    pub about: usize,
+    /// Deviation between periods over the `torque_noise` of the robot file above which that one counts. Unit:
+    /// ratio. Source: by hand.
+    pub stated: f64,
+    /// Frequency from which on a record without periods shows its noise, over the band of its motion. Unit: ratio.
+    /// Source: by hand.
+    pub above: f64,
+    /// Lines that are left for that at least. Unit: count. Source: by hand.
+    pub last: usize,
+    /// Least power of a line over that of all. Unit: share. Source: by hand.
+    pub least: f64,
+    /// Frequency above which what encoders leave unknown of the acceleration grows no more. Unit: Hz. Source: by
+    /// hand.
+    pub resolved: f64,
+    /// Lines to either side of the median of the residual that limits it. Unit: count. Source: by hand.
+    pub excess: usize,
+}
+
+pub(super) const NOISE: Noise = Noise {
+    slow: 4.0,
+    order: 12,
+    lines: 128,
+    level: 3.0,
+    flat: 0.5,
+    lone: 4.0,
+    about: 6,
+    stated: 1.5,
+    above: 2.0,
+    last: 8,
+    least: 1e-3,
+    resolved: 60.0,
+    excess: 5,
+};
+
+/// What the torque channel makes of a signal.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Window {
+    /// Sub-steps of a sampling interval over which what is not smooth is averaged. Unit: count. Source: by hand.
+    pub fine: usize,
+    /// Argument beyond which a hyperbolic tangent counts as ±1. Unit: none. Source: it is, to rounding.
+    pub saturated: f64,
+    /// Largest variance of the window. Unit: samples². Source: by hand.
+    pub widest: f64,
+    /// Most of it that one pass of a kernel of three points takes. Unit: samples². Source: by hand.
+    pub pass: f64,
+}
+
+pub(super) const WINDOW: Window = Window {
+    fine: 4,
+    saturated: 20.0,
+    widest: 3.0,
+    pass: 0.3,
+};
+
+/// What a log of any robot may have about a reversal.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Reversals {
+    /// Width of the sign of dry friction in the nominal model, over the largest speed. Unit: share. Source: by
+    /// hand.
+    pub sharp: f64,
+    /// Widths over which it may change its sign instead, over the largest speed. Unit: share. Source: by hand.
+    pub rounded: [f64; 3],
+    /// Deviation of these a priori, over the dry friction. Unit: share. Source: by hand.
+    pub rounding: f64,
+    /// Part of the dry friction by which a model may be off close to a reversal. Unit: share. Source: by hand.
+    pub bent: f64,
+    /// How long that lasts to either side, and how long it takes to fade. Unit: s. Source: by hand.
+    pub near: f64,
+    /// Part of its fastest speed below which a drive of a closed chain may stand. Unit: share. Source: by hand.
+    pub stands: f64,
+    /// Time by which velocities from positions are blurred. Unit: s. Source: by hand.
+    pub blur: f64,
+}
+
+pub(super) const REVERSALS: Reversals = Reversals {
+    sharp: 1e-3,
+    rounded: [2e-3, 4e-3, 8e-3],
+    rounding: 0.5,
+    bent: 0.1,
+    near: 0.012,
+    stands: 0.01,
+    blur: 0.015,
+};
+
+/// Standard deviations of the parameters a priori. Of two values the first is that of an identified model, the second that
+/// of one from CAD.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Prior {
+    /// Mass of a link, over its mass; identified, CAD. Unit: share. Source: by hand.
+    pub mass: [f64; 2],
+    /// First moment of a link, over its mass times its length; identified, CAD. Unit: share. Source: by hand.
+    pub first: [f64; 2],
+    /// Inertia tensor of a link, over its mass times its length squared; identified, CAD. Unit: share. Source: by hand.
+    pub second: [f64; 2],
+    /// Inertia of a rotor, over its value; identified, CAD. Unit: share. Source: by hand.
+    pub armature: [f64; 2],
+    /// Viscous friction, over its value; identified, CAD. Unit: share. Source: by hand.
+    pub viscous: [f64; 2],
+    /// Coulomb friction, over its value; identified, CAD. Unit: share. Source: by hand.
+    pub coulomb: [f64; 2],
+    /// Torque offset, over the friction (`at_speed`); identified, CAD. Unit: share. Source: by hand.
+    pub offset: [f64; 2],
+    /// Part of viscous friction at the largest speed that counts beside Coulomb friction there. Unit: share. Source: by hand.
+    pub at_speed: f64,
+    /// Least deviation of a torque offset, over that of the torque noise; identified, CAD. Unit: ratio. Source: by
+    /// hand.
+    pub offset_noise: [f64; 2],
+    /// Least deviation of a joint term, over that of the torque noise. Unit: ratio. Source: by hand.
+    pub noise: f64,
+    /// Mass that a link counts with at least, over that of the heaviest. Unit: share. Source: by hand.
+    pub lightest: f64,
+    /// Mass that a link counts with at least. Unit: kg. Source: by hand.
+    pub light: f64,
+    /// Length that a link counts with at least. Unit: m. Source: by hand.
+    pub short: f64,
+}
+
+pub(super) const PRIOR: Prior = Prior {
+    mass: [0.015, 0.2],
+    first: [0.006, 0.1],
+    second: [0.008, 0.12],
+    armature: [0.06, 0.3],
+    viscous: [0.15, 0.4],
+    coulomb: [0.06, 0.35],
+    offset: [0.04, 0.2],
+    at_speed: 0.3,
+    offset_noise: [0.3, 1.0],
+    noise: 0.02,
+    lightest: 0.02,
+    light: 1e-3,
+    short: 0.03,
+};
+
+/// How close an identified model is to its robot.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Closeness {
+    /// Factors on the deviations of the prior that are tried. Unit: ratio. Source: by hand.
+    pub scales: [f64; 7],
+    /// How far a factor may lie above the likeliest. Unit: −2 ln p. Source: 95 % point of χ² with one freedom.
+    pub likely: f64,
+    /// By how much the factors of moments and of tensors may differ: robots of few joints hardly distinguish
+    /// them, and one must not be taken for exact because the other can stand for it. Unit: ratio. Source: by
+    /// hand.
+    pub apart: f64,
+}
+
+pub(super) const CLOSENESS: Closeness = Closeness {
+    scales: [1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.125],
+    likely: 3.84,
+    apart: 3.0,
+};
+
+/// An unknown load.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Load {
+    /// Deviation of its mass a priori, at least: wide enough to leave it free. Unit: kg. Source: by hand.
+    pub lightest: f64,
+    /// Lever of that mass in the deviations of first moments and, squared, of the tensor. Unit: m. Source: by hand.
+    pub lever: f64,
+    /// Mass below which a motion shows nothing of it. Unit: kg. Source: by hand.
+    pub least: f64,
+}
+
+pub(super) const LOAD: Load = Load {
+    lightest: 10.0,
+    lever: 0.5,
+    least: 1e-6,
+};
+
+/// The controller of the logs.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Controller {
+    /// Natural frequency of the spring that takes its place where it is unknown. Unit: Hz. Source: by hand.
+    pub bandwidth: f64,
+    /// How many of its standard deviations a gain must be. Unit: ratio. Source: by hand.
+    pub certain: f64,
+    /// Most that the controller may leave of the torque, rms over rms. Unit: share. Source: by hand.
+    pub left: f64,
+    /// The same in standard deviations of the torque noise. Unit: ratio. Source: by hand.
+    pub noise: f64,
+    /// What an inverse-dynamics controller must leave less than one of single joints. Unit: ratio. Source: by
+    /// hand.
+    pub plain: f64,
+    /// Velocity below which the sign of Coulomb friction is smoothed, over the fastest. Unit: share. Source:
+    /// by hand.
+    pub slow: f64,
+}
+
+pub(super) const CONTROLLER: Controller = Controller {
+    bandwidth: 2.0,
+    certain: 6.0,
+    left: 0.1,
+    noise: 3.0,
+    plain: 1.02,
+    slow: 0.02,
+};

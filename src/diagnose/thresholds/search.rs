@@ -1,0 +1,65 @@
+//! How far the search goes.
+
+/// How far the search goes.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Search {
+    /// Effects that a set may have. Unit: count. Source: by hand.
+    pub members: usize,
+    /// Candidates that have their turn in a forward step. Unit: count. Source: by hand.
+    pub tried: usize,
+    /// Challengers that are refined in a forward step. Unit: count. Source: by hand.
+    pub forward: usize,
+    /// The same when members are exchanged. Unit: count. Source: by hand.
+    pub exchange: usize,
+    /// The same when members are judged. Unit: count. Source: by hand.
+    pub judged: usize,
+    /// Places of an effect among the challengers. Unit: count. Source: by hand.
+    pub places: usize,
+    /// Places of an effect in the search of pairs. Unit: count. Source: by hand.
+    pub pair_places: usize,
+    /// Candidates in the search of pairs. Unit: count. Source: by hand.
+    pub pairs: usize,
+    /// What a pair must gain more than the set, of the whole gap. Unit: share. Source: by hand.
+    pub pair_margin: f64,
+    /// What a challenger must gain to replace a member, over what that one gains. Unit: ratio. Source: by hand.
+    pub exchange_margin: f64,
+    /// Rounds of exchange. Unit: count. Source: by hand.
+    pub rounds: usize,
+}
+
+pub(super) const SEARCH: Search = Search {
+    members: 4,
+    tried: 5,
+    forward: 10,
+    exchange: 6,
+    judged: 14,
+    places: 2,
+    pair_places: 3,
+    pairs: 22,
+    pair_margin: 0.01,
+    exchange_margin: 1.01,
+    rounds: 2,
+};
+
+/// How shapes are refined between the points of their grids.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Shapes {
+    /// Gain from which on a shape is refined. Unit: noise variances. Source: by hand.
+    pub refined: f64,
+    /// Factors of the steps. Unit: ratio. Source: by hand.
+    pub steps: [f64; 3],
+    /// How far below the grid a shape may lie. Unit: ratio. Source: by hand.
+    pub below: f64,
+    /// How far above the grid a shape may lie. Unit: ratio. Source: by hand.
+    pub above: f64,
+    /// Gain over the best so far that makes a step worth while. Unit: ratio. Source: by hand.
+    pub better: f64,
+}
+
+pub(super) const SHAPES: Shapes = Shapes {
+    refined: 20.0,
+    steps: [1.3, 1.12, 1.05],
+    below: 1.5,
+    above: 1.2,
+    better: 1.0005,
+};
