@@ -147,7 +147,7 @@ fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> 
             }
         }
     }
-    if plant.mechanism().is_some() {
+    if plant.closed() {
         return match asked {
             Some(_) => Err(Error::Argument(
                 "--identify is for serial robots; list the terms of a parallel one in its file"

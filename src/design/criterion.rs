@@ -63,9 +63,9 @@ impl Condition {
     /// What is usual for a plant: the invariant condition number of a tree; unit columns for a closed
     /// chain, whose parameters differ by many orders of magnitude in size.
     pub fn usual(plant: &Plant) -> Self {
-        match plant.mechanism() {
-            None => Condition::Invariant,
-            Some(_) => Condition::Normalised,
+        match plant.closed() {
+            false => Condition::Invariant,
+            true => Condition::Normalised,
         }
     }
 }

@@ -24,9 +24,9 @@ impl Data<'_> {
             if coulomb == 0.0 {
                 continue;
             }
-            self.weights[j] = match self.plant.mechanism() {
-                None => self.doubt(j, coulomb),
-                Some(_) => self.sticking(j),
+            self.weights[j] = match self.plant.closed() {
+                false => self.doubt(j, coulomb),
+                true => self.sticking(j),
             };
             let kept = self.weights[j].iter_mut().zip(&measured);
             kept.for_each(|(w, m)| *w *= m);

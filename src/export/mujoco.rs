@@ -21,7 +21,7 @@ impl Format for Mujoco {
     }
 
     fn holds(&self, plant: &Plant) -> bool {
-        plant.mechanism().is_none()
+        !plant.closed()
     }
 
     fn has(&self, part: Part) -> bool {

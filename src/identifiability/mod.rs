@@ -179,7 +179,7 @@ fn alone(plant: &Plant) -> Result<Assessment> {
     Ok(Assessment {
         warnings: known.chain(more).collect(),
         values: plant.values(),
-        mechanism: plant.mechanism().is_some(),
+        mechanism: plant.closed(),
         robot: plant.actuator_robot(),
         base,
         torque_noise,

@@ -78,7 +78,7 @@ pub struct System {
 /// Columns of what may deviate in the empty robot: all bodies and armatures of a serial robot, the
 /// platform of a parallel one.
 fn deviation_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<(Mat<f64>, Vec<String>)> {
-    if plant.mechanism().is_some() {
+    if plant.closed() {
         let names = crate::robot::inertia::NAMES.map(|n| format!("platform.{n}"));
         return Ok((plant.body_columns(tool, x)?, names.to_vec()));
     }

@@ -15,6 +15,7 @@
 
 mod certify;
 mod follow;
+mod kind;
 mod noise;
 mod torque;
 mod values;

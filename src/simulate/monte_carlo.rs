@@ -129,7 +129,7 @@ impl Setup<'_> {
         let k = self.harmonics;
         let q = average(&measured.q, count, self.periods);
         let tau = average(&measured.tau, count, self.periods);
-        let x = self.coordinates(&q, n)?;
+        let x = self.plant.coordinates_from(&self.start, &q, n)?;
         let m = x.len() / n;
         let dense = (16 * k).clamp(800, 20_000);
         let mut motion = Samples::zeros(m, dense);
@@ -182,25 +182,6 @@ impl Setup<'_> {
         }
         let solution = a.qr().solve_lstsq(&y);
         Ok((0..b).map(|c| solution[(c, 0)]).collect())
-    }
-
-    /// Coordinates of the plant from positions of the actuators, one period.
-    fn coordinates(&self, q: &[f64], n: usize) -> Result<Vec<f64>> {
-        let Some(mechanism) = self.plant.mechanism() else {
-            return Ok(q.to_vec());
-        };
-        let na = mechanism.actuators();
-        let m = mechanism.freedoms();
-        let mut x = vec![0.0; m * n];
-        let mut pose = self.start.clone();
-        for i in 0..n {
-            let lengths: Vec<f64> = (0..na).map(|a| q[a * n + i]).collect();
-            pose = mechanism.forward(&lengths, &pose)?.x;
-            for (c, v) in pose.iter().enumerate() {
-                x[c * n + i] = *v;
-            }
-        }
-        Ok(x)
     }
 }
 

@@ -4,6 +4,7 @@ use super::base_compliance;
 use super::estimate::{Place, Quantity};
 use crate::diagnose::column::Column;
 use crate::diagnose::data::Data;
+use crate::diagnose::thresholds::THRESHOLDS as T;
 use crate::diagnose::window::{averaged, sign};
 use crate::dynamics::Samples;
 use crate::mechanism::MechanismMotion;
@@ -43,7 +44,7 @@ impl<'a> Context<'a> {
             .map(|r| r.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-9))
             .collect();
         let mut mass = Vec::new();
-        if data.plant.mechanism().is_none() {
+        if !data.plant.closed() {
             for j in 0..data.joints() {
                 let more = data.torque_of(&phi, |r, _, x| {
                     x.qdd[j * r.count..(j + 1) * r.count]
@@ -83,7 +84,7 @@ impl<'a> Context<'a> {
 
     /// Whether it is a serial robot.
     pub fn serial(&self) -> bool {
-        self.data.plant.mechanism().is_none()
+        !self.data.plant.closed()
     }
 
     /// Actuators whose nominal model has no unknown of this kind.
@@ -124,7 +125,7 @@ impl<'a> Context<'a> {
 
     /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
     pub fn sign(&self, j: usize) -> Vec<f64> {
-        let width = 1e-3 * self.data.speed[j];
+        let width = T.reversals.sharp * self.data.speed[j];
         self.data.own(j, |_, v| sign(v, width))
     }
 

@@ -1,7 +1,6 @@
 //! Legs or forearms of a parallel robot whose inertia the model leaves out.
 
 use super::*;
-use crate::mechanism::Source;
 use crate::robot::inertia::UNITS;
 
 /// Neglected leg inertia.
@@ -82,21 +81,16 @@ const REVOLUTION: [&[usize]; 4] = [&[0], &[3], &[4, 7], &[9]];
 /// count as massless.
 fn unknowns(cx: &Context) -> Vec<Unknown> {
     // the links of a general closed chain have no common axes
-    let Some(mechanism) = cx
-        .data
-        .plant
-        .mechanism()
-        .filter(|m| !matches!(m.source, Source::Loops(_)))
-    else {
+    if !cx.data.plant.closed() || cx.data.plant.looped() {
         return Vec::new();
-    };
+    }
     let stands = |body: usize| {
         cx.data
             .parameters
             .iter()
             .any(|p| matches!(p.kind, plant::Column::Inertial { body: b, .. } if b == body))
     };
-    let bodies = &mechanism.robot.bodies;
+    let bodies = &cx.data.plant.robot().bodies;
     let of = |kind: &str| -> Vec<usize> {
         let fits = |b: &usize| {
             let name = &bodies[*b].name;

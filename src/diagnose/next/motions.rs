@@ -61,15 +61,14 @@ impl<'a> Motions<'a> {
 
     /// The program's own designs on two grids, each also slower.
     fn designed(&self, seed: u64) -> Vec<(Fourier, usize)> {
-        let parallel = self.plant.mechanism();
         // following loops in every step of the optimiser takes minutes
-        if parallel.is_some_and(|m| matches!(m.source, crate::mechanism::Source::Loops(_))) {
+        if self.plant.looped() {
             return Vec::new();
         }
         let mut all = Vec::new();
         for (k, grid) in [Grid::Odd, Grid::Full].into_iter().enumerate() {
             let wanted = Design {
-                harmonics: T.motions.harmonics[usize::from(parallel.is_some())],
+                harmonics: T.motions.harmonics[usize::from(self.plant.closed())],
                 period: T.motions.period,
                 grid,
                 seed: seed + k as u64,
