@@ -71,6 +71,17 @@ impl Error {
     }
 }
 
+/// A computed number as messages show it: six significant digits without zeros at the end, with an
+/// exponent from a million up and below 0.001.
+pub(crate) fn number(x: f64) -> String {
+    // the shortest text of the rounded number has no more than its digits
+    let x: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    match x == 0.0 || !x.is_finite() || (1e-3..1e6).contains(&x.abs()) {
+        true => format!("{x}"),
+        false => format!("{x:e}"),
+    }
+}
+
 /// Declares [`WarningKind`] with the code of each kind beside it.
 macro_rules! warning_kinds {
     ($($(#[$doc:meta])+ $name:ident = $code:literal,)+) => {
@@ -201,5 +212,25 @@ impl Warning {
 impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}", self.subject, self.message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_of_messages_have_no_dust() {
+        for (x, text) in [
+            (3.0 * 0.7, "2.1"),
+            (0.1 + 0.2, "0.3"),
+            (-2.0, "-2"),
+            (0.0, "0"),
+            (1234567.0, "1.23457e6"),
+            (1.0 / 3e5, "3.33333e-6"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number(x), text);
+        }
     }
 }

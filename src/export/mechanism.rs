@@ -3,7 +3,7 @@
 //! to the URDF of [`super::urdf`].
 
 use super::{base_name, possible, rpy};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, number};
 use crate::mechanism::loops::{Closure, Coincide, Frame};
 use crate::mechanism::{Mechanism, Source};
 use crate::robot::{Inertia, JointTerm, Robot};
@@ -55,6 +55,12 @@ fn numbers(list: &[f64]) -> Value {
     Value::Array(list.iter().map(|&x| Value::Float(x)).collect())
 }
 
+/// First moments in words.
+fn moments(inertia: &Inertia) -> String {
+    let all: Vec<String> = inertia.first_moment().iter().map(|v| number(*v)).collect();
+    format!("[{}]", all.join(", "))
+}
+
 /// `{ mass, com, inertia }` of a body that can exist.
 fn entry(name: &str, inertia: &Inertia) -> Result<Table> {
     let inertia = match inertia.mass() > 0.0 {
@@ -65,8 +71,9 @@ fn entry(name: &str, inertia: &Inertia) -> Result<Table> {
     let com = inertia.com().unwrap_or_default();
     if mass < 0.0 || (mass == 0.0 && inertia.first_moment() != Vector3::zeros()) {
         return Err(Error::Infeasible(format!(
-            "{name}: a robot file cannot carry a mass of {mass} kg with first moments {:?} kg m",
-            inertia.first_moment().as_slice()
+            "{name}: a robot file cannot carry a mass of {} kg with first moments {} kg m",
+            number(mass),
+            moments(inertia)
         )));
     }
     let i = inertia.tensor_com();
@@ -176,8 +183,8 @@ fn chains(file: &mut Table, mechanism: &Mechanism, robot: &Robot) -> Result<()> 
         let own = inertia_of(robot, name);
         if lumped && name == "platform" && own.first_moment() != Vector3::zeros() {
             return Err(Error::Infeasible(format!(
-                "{name}: a lumped model has no place for its first moments {:?} kg m",
-                own.first_moment().as_slice()
+                "{name}: a lumped model has no place for its first moments {} kg m",
+                moments(&own)
             )));
         }
         let inertia = match (lumped, name.starts_with("arm"), name == "platform") {

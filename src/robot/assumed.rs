@@ -1,7 +1,7 @@
 //! Limits that a design needs and a robot does not state.
 
 use super::{Motion, Robot};
-use crate::error::{Warning, WarningKind};
+use crate::error::{Warning, WarningKind, number};
 
 impl Robot {
     /// Fills in limits that a robot does not state, each with a warning: ±π or ±0.5 m, 1 rad/s or
@@ -33,7 +33,10 @@ impl Robot {
             }
             if !l.acceleration.is_finite() {
                 l.acceleration = 5.0 * l.velocity;
-                assumed.push(format!("acceleration {} {unit}/s^2", l.acceleration));
+                assumed.push(format!(
+                    "acceleration {} {unit}/s^2",
+                    number(l.acceleration)
+                ));
             }
             if !assumed.is_empty() {
                 robot.warnings.push(Warning::new(

@@ -47,7 +47,7 @@ pub use record::{Measured, Sensors, measure, to_record};
 pub use run::Run;
 pub use settings::Settings;
 
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, number};
 use crate::plant::Plant;
 use crate::trajectory::Fourier;
 use simulator::{Instant, Simulator};
@@ -224,9 +224,11 @@ fn samples(plant: &Plant, fourier: &Fourier, periods: u32, settings: &Settings) 
     let duration = fourier.period * (f64::from(periods) + f64::from(settings.lead_in));
     if duration / settings.step > STEPS || fourier.period / settings.step > TABLE {
         return Err(Error::Argument(format!(
-            "{} periods before the log and {periods} in it, {duration} s, are too many steps of {} s: \
+            "{} periods before the log and {periods} in it, {} s, are too many steps of {} s: \
              {STEPS:e} in all and {TABLE:e} a period are possible; choose a larger --step or fewer periods",
-            settings.lead_in, settings.step
+            settings.lead_in,
+            number(duration),
+            settings.step
         )));
     }
     Ok(samples as usize)

@@ -2,7 +2,7 @@
 
 use super::fourier::Fourier;
 use super::torque::TorqueFn;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, number};
 use crate::output::write_atomic;
 use std::io::{self, Write};
 use std::path::Path;
@@ -119,7 +119,8 @@ pub fn times(duration: f64, rate: f64) -> Result<Vec<f64>> {
     let steps = duration * rate;
     if !(duration >= 0.0 && steps < ROWS_MAX) {
         return Err(Error::Argument(format!(
-            "{duration} s at {rate} Hz cannot be sampled; use a lower --rate or fewer --periods"
+            "{} s at {rate} Hz cannot be sampled; use a lower --rate or fewer --periods",
+            number(duration)
         )));
     }
     // a whole number of steps but for rounding ends on the grid

@@ -5,7 +5,7 @@
 
 use super::fourier::Fourier;
 use super::samples::{Samples, times};
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, number};
 use crate::robot::{Limits, Robot};
 use rsruckig::prelude::{
     DataArrayOrVec, InputParameter, Ruckig, RuckigResult, Synchronization, ThrowErrorHandler,
@@ -184,7 +184,8 @@ fn assumed(name: &str, mut limits: Limits, warnings: &mut Vec<Warning>) -> Resul
         if value.is_infinite() {
             *value = default;
             let message = format!(
-                "has no {what} limit; {default} is assumed for the move to and from the start"
+                "has no {what} limit; {} is assumed for the move to and from the start",
+                number(default)
             );
             warnings.push(Warning::new(WarningKind::LimitsMissing, name, message));
         }
@@ -215,13 +216,23 @@ fn inside(joint: &str, which: &str, limits: &Limits, [q, qd, qdd]: [f64; 3]) -> 
     let fault = if !(q.is_finite() && qd.is_finite() && qdd.is_finite()) {
         "not finite".to_string()
     } else if q < a - slack || q > b + slack {
-        format!("at {q}, outside its position limits [{a}, {b}]")
+        format!(
+            "at {}, outside its position limits [{}, {}]",
+            number(q),
+            number(a),
+            number(b)
+        )
     } else if qd.abs() > limits.velocity * slight {
-        format!("at velocity {qd}, above its limit {}", limits.velocity)
+        format!(
+            "at velocity {}, above its limit {}",
+            number(qd),
+            number(limits.velocity)
+        )
     } else if qdd.abs() > limits.acceleration * slight {
         format!(
-            "at acceleration {qdd}, above its limit {}",
-            limits.acceleration
+            "at acceleration {}, above its limit {}",
+            number(qdd),
+            number(limits.acceleration)
         )
     } else {
         return Ok(());

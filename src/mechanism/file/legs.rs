@@ -2,7 +2,7 @@
 
 use super::body::{BodyEntry, Ring, numbers, vector};
 use super::common::{identified, mechanism_file, optional};
-use crate::error::{Result, Warning, WarningKind};
+use crate::error::{Result, Warning, WarningKind, number};
 use crate::mechanism::Mechanism;
 use crate::mechanism::gough_stewart::{Bodies, GoughStewart, Leg, joint_frame};
 use crate::mechanism::task::rotation;
@@ -193,7 +193,9 @@ fn check_lengths(
                 format!("leg{}", i + 1),
                 format!(
                     "home lies outside its stroke: it would read {q:.4} m, its limits are \
-                     [{low}, {high}] m"
+                     [{}, {}] m",
+                    number(low),
+                    number(high)
                 ),
             ));
         }
