@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use faer::Mat;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Serialize, Serializer};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -16,6 +16,29 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub fn rows<S: Serializer>(m: &Mat<f64>, serializer: S) -> std::result::Result<S::Ok, S::Error> {
     let row = |i: usize| (0..m.ncols()).map(move |j| m[(i, j)]).collect::<Vec<f64>>();
     serializer.collect_seq((0..m.nrows()).map(row))
+}
+
+/// A vector in a serialised result: a list of its coordinates.
+///
+/// # Errors
+/// Those of the serialiser.
+pub fn vector<S: Serializer>(
+    v: &Vector3<f64>,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    [v.x, v.y, v.z].serialize(serializer)
+}
+
+/// A rotation in a serialised result: a list of its rows.
+///
+/// # Errors
+/// Those of the serialiser.
+pub fn rotation<S: Serializer>(
+    r: &Matrix3<f64>,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    let row = |i: usize| [r[(i, 0)], r[(i, 1)], r[(i, 2)]];
+    [row(0), row(1), row(2)].serialize(serializer)
 }
 
 /// Two points in a serialised result: a list of their coordinates.

@@ -80,6 +80,20 @@ pub fn files(plant: &Plant) -> Vec<&'static str> {
 }
 
 /// Every file of a model, in the order of [`files`], with its text or why there is none.
+///
+/// ```
+/// use excite::Plant;
+/// use excite::export::{Model, write};
+///
+/// let plant = Plant::load("ur5e")?;
+/// let mut robot = plant.robot().clone();
+/// robot.joints[0].terms[2] = 7.5; // Coulomb friction as it was identified, N m
+/// let model = Model { plant: &plant, robot: &robot, remarks: &[] };
+/// for (name, text) in write(&model) {
+///     assert!(!text?.is_empty(), "{name}"); // robot.urdf, robot.xml, robot.toml
+/// }
+/// # Ok::<(), excite::Error>(())
+/// ```
 pub fn write(model: &Model) -> Vec<(&'static str, Result<String>)> {
     let held = FORMATS.iter().filter(|f| f.holds(model.plant));
     held.map(|f| (f.file(), f.write(model))).collect()

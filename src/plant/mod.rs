@@ -17,6 +17,7 @@ mod certify;
 mod follow;
 mod kind;
 mod noise;
+mod summary;
 mod torque;
 mod values;
 

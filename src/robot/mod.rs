@@ -36,7 +36,7 @@ pub enum Motion {
 ///
 /// The body frame `B` (the URDF link frame) sits in the parent's frame `P` at
 /// `X_PB(q) = (rotation, position) · motion(axis, ratio·q + offset)`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Body {
     /// name of the URDF link
     pub name: String,
@@ -47,10 +47,13 @@ pub struct Body {
     /// kind of joint
     pub motion: Motion,
     /// unit axis, in the axes of the body frame
+    #[serde(serialize_with = "crate::output::vector")]
     pub axis: Vector3<f64>,
     /// rotation `R_PB` at zero joint position
+    #[serde(serialize_with = "crate::output::rotation")]
     pub rotation: Matrix3<f64>,
     /// position of the body origin in the parent's frame at zero joint position, m
+    #[serde(serialize_with = "crate::output::vector")]
     pub position: Vector3<f64>,
     /// inertial parameters, including all links merged into this one
     pub inertia: Inertia,
@@ -64,6 +67,7 @@ pub struct Body {
     pub offset: f64,
     /// axis, rotation and position that the file means, where its rounded numbers say something
     /// else; see `meant`
+    #[serde(skip)]
     pub meant: Option<Placement>,
 }
 
@@ -162,7 +166,7 @@ impl JointTerm {
 }
 
 /// One coordinate: what is commanded and measured.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Joint {
     /// name of the URDF joint
     pub name: String,
@@ -226,7 +230,7 @@ pub enum Prior {
 }
 
 /// A robot: bodies, coordinates, gravity. See the [module](self) documentation.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Robot {
     /// name, as printed and stored
     pub name: String,
@@ -235,6 +239,7 @@ pub struct Robot {
     /// coordinates from the base to the tips, in the order of the joint columns of every log
     pub joints: Vec<Joint>,
     /// acceleration of gravity in base axes, m/s²
+    #[serde(serialize_with = "crate::output::vector")]
     pub gravity: Vector3<f64>,
     /// trust in the nominal values
     pub prior: Prior,

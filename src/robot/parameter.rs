@@ -3,7 +3,8 @@
 use super::JointTerm;
 
 /// What one column of a regressor stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Column {
     /// inertial parameter `k` (see `inertia::NAMES`) of body `body`
     Inertial {
@@ -25,7 +26,7 @@ pub enum Column {
 }
 
 /// One unknown: a column of a regressor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Parameter {
     /// `link3.mz`, `leg1.viscous`
     pub name: String,

@@ -10,7 +10,7 @@
 use std::f64::consts::PI;
 
 /// Low-pass and decimation.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Decimator {
     /// gain one half, Hz; infinite for none
     pub cutoff: f64,
@@ -19,6 +19,7 @@ pub struct Decimator {
     /// weights of the middle and of the neighbours to one side; sums to 1 over both
     taps: Vec<f64>,
     /// the same over both sides, in order
+    #[serde(skip)]
     kernel: Vec<f64>,
     /// inputs that the outputs stand at
     at: Vec<usize>,

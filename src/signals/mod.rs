@@ -97,7 +97,7 @@ impl Default for Settings {
 }
 
 /// What the periods of a repeated motion tell beside their mean.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Periods {
     /// number of whole periods
     pub count: usize,
@@ -111,13 +111,14 @@ pub struct Periods {
     pub position: Vec<Vec<f64>>,
     /// covariance of the torque noise of one period between actuators, (N m)², unfiltered:
     /// the scatter about the mean, `1/((n_p−1)N) Σ_p Σ_i e_p(i) e_p(i)ᵀ`
+    #[serde(serialize_with = "crate::output::rows")]
     pub torque_covariance: Mat<f64>,
     /// standard deviation of the position noise of one period of each actuator
     pub position_noise: Vec<f64>,
 }
 
 /// A record ready for estimation. Lists are actuator-major (`a·count + i`) like the motion's.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize)]
 pub struct Prepared {
     /// name of the record
     pub name: String,

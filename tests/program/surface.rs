@@ -43,7 +43,23 @@ fn results_are_serialised() {
     serialisable::<excite::simulate::Run>();
     serialisable::<excite::plant::Certified>();
 
+    serialisable::<excite::signals::Prepared>();
+
     let plant = Plant::load("planar2").unwrap();
+    let written = to_value(&plant).unwrap();
+    let body = &written["robot"]["bodies"][1];
+    assert_eq!(body["name"], plant.robot().bodies[1].name);
+    assert_eq!(body["inertia"][0], plant.robot().bodies[1].inertia.mass());
+    assert_eq!(
+        body["rotation"][0][0],
+        plant.robot().bodies[1].rotation[(0, 0)]
+    );
+    assert_eq!(written["actuators"].as_array().unwrap().len(), 2);
+    assert_eq!(written["mechanism"], Value::Null);
+    assert_eq!(
+        written["parameters"].as_array().unwrap().len(),
+        plant.values().len()
+    );
     let settings = Settings {
         starts: Some(1),
         ..Settings::default()
