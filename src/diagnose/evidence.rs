@@ -14,11 +14,17 @@
 //! of a frozen model. Both questions are one formula. The **visibility** of an effect is
 //! `ηᵀ Λ_e η / ηᵀZᵀZη`.
 
+mod algebra;
+mod left;
+mod nominal;
+
+pub use algebra::solve;
+
 use super::column::Column;
 use super::data::Data;
+use algebra::{dot, overlap};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
-use rayon::prelude::*;
 
 /// Columns of an effect, whitened and reduced by the nominal model.
 #[derive(Debug, Clone)]
@@ -117,122 +123,7 @@ pub struct Evidence<'a> {
     pub spread: Vec<f64>,
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // four sums: the compiler may use wide registers without reordering one sum
-    let mut s = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            s[k] += x[k] * y[k];
-        }
-    }
-    s.iter().sum::<f64>() + tail
-}
-
-impl<'a> Evidence<'a> {
-    /// With the prior of the data, its deviations multiplied by `loosen`.
-    pub fn new(data: &'a Data<'a>, loosen: f64) -> Self {
-        let n = data.joints();
-        let p = data.parameters.len();
-        let fitted = data.fitted;
-        let phi: Vec<f64> = data.parameters.iter().map(|p| p.value).collect();
-        // a parameter that is exactly zero a priori must still be able to move
-        let floor = 1e-9;
-        let spread: Vec<f64> = data
-            .spread
-            .iter()
-            .map(|s| (s * loosen).max(floor))
-            .collect();
-        let mut w: Vec<Mat<f64>> = (0..n)
-            .into_par_iter()
-            .map(|j| {
-                let mut out = Mat::zeros(data.rows(), p);
-                for c in 0..p {
-                    let from: Vec<f64> = data.w[j].col(c).iter().copied().collect();
-                    if from.iter().all(|v| *v == 0.0) {
-                        continue;
-                    }
-                    for (i, v) in data.modelled(j, &from).into_iter().enumerate() {
-                        out[(i, c)] = v;
-                    }
-                }
-                out
-            })
-            .collect();
-        let nominal = data.model_torque(&phi);
-        let r: Vec<Vec<f64>> = (0..n)
-            .into_par_iter()
-            .map(|j| {
-                let model = data.windowed(&nominal[j]);
-                let raw: Vec<f64> = data.tau[j].iter().zip(&model).map(|(a, b)| a - b).collect();
-                data.whiten(j, &raw)
-            })
-            .collect();
-        let grams: Vec<Mat<f64>> = w
-            .par_iter()
-            .map(|w| {
-                let f = w.subrows(0, fitted);
-                f.transpose() * f
-            })
-            .collect();
-        // scaled by the prior, so that the matrix is 1 + something
-        let mut a = Mat::<f64>::identity(p, p);
-        for g in &grams {
-            for i in 0..p {
-                for k in 0..p {
-                    a[(i, k)] += g[(i, k)] * spread[i] * spread[k];
-                }
-            }
-        }
-        let l = match a.llt(Side::Lower) {
-            Ok(f) => f.L().to_owned(),
-            Err(_) => Mat::identity(p, p),
-        };
-        // Q = W diag(spread) L⁻ᵀ: solve L Qᵀ = (W diag(spread))ᵀ
-        w.par_iter_mut().for_each(|w| {
-            for c in 0..p {
-                for i in 0..w.nrows() {
-                    w[(i, c)] *= spread[c];
-                }
-            }
-            let mut t = w.transpose().to_owned();
-            faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-                l.as_ref(),
-                t.as_mut(),
-                faer::Par::Seq,
-            );
-            *w = t.transpose().to_owned();
-        });
-        let q = w;
-        let mut d = vec![0.0; p];
-        let mut rr = 0.0;
-        for j in 0..n {
-            for (c, d) in d.iter_mut().enumerate() {
-                let column = q[j].col(c);
-                let column = column.try_as_col_major().expect("column major").as_slice();
-                *d += dot(&column[..fitted], &r[j][..fitted]);
-            }
-            rr += dot(&r[j][..fitted], &r[j][..fitted]);
-        }
-        let j0 = rr - dot(&d, &d);
-        Evidence {
-            data,
-            phi,
-            q,
-            l,
-            r,
-            d,
-            j0,
-            spread,
-        }
-    }
-
+impl Evidence<'_> {
     /// `WᵀW` and `Wᵀr` over fitted rows, in units of the prior.
     pub fn normal_equations(&self) -> [Mat<f64>; 2] {
         let gram = &self.l * self.l.transpose() - Mat::<f64>::identity(self.d.len(), self.d.len());
@@ -378,64 +269,6 @@ impl<'a> Evidence<'a> {
         solve(&s, &b)
     }
 
-    /// Parameters of the nominal model that go with a fit of a set.
-    pub fn parameters(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
-        let p = self.d.len();
-        let u = self.reduced(set, fit);
-        // L^T x = u
-        let mut x = Mat::from_fn(p, 1, |i, _| u[i]);
-        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
-            self.l.transpose(),
-            x.as_mut(),
-            faer::Par::Seq,
-        );
-        (0..p)
-            .map(|i| self.phi[i] + self.spread[i] * x[(i, 0)])
-            .collect()
-    }
-
-    fn reduced(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
-        let mut u = self.d.clone();
-        let mut at = 0;
-        for a in set {
-            for i in 0..a.z.len() {
-                for (m, u) in u.iter_mut().enumerate() {
-                    *u -= a.c[(m, i)] * fit.eta[at + i];
-                }
-            }
-            at += a.z.len();
-        }
-        u
-    }
-
-    /// Whitened residual of all rows with a fitted set, by actuator.
-    pub fn residual(&self, set: &[&Projected], fit: &Fit) -> Vec<Vec<f64>> {
-        let u = self.reduced(set, fit);
-        (0..self.data.joints())
-            .into_par_iter()
-            .map(|j| {
-                let y = &self.q[j] * faer::ColRef::from_slice(&u);
-                let mut e: Vec<f64> = self.r[j]
-                    .iter()
-                    .enumerate()
-                    .map(|(i, r)| r - y[i])
-                    .collect();
-                let mut at = 0;
-                for a in set {
-                    for column in &a.z {
-                        if let Some(v) = column.get(j) {
-                            for (e, v) in e.iter_mut().zip(v) {
-                                *e -= fit.eta[at] * v;
-                            }
-                        }
-                        at += 1;
-                    }
-                }
-                e
-            })
-            .collect()
-    }
-
     /// Share of effect `a` with coefficients `eta` that effect `b` can imitate once the nominal model
     /// has taken its share: the squared cosine of the projected angle.
     pub fn overlap(&self, a: &Projected, eta: &[f64], b: &Projected) -> f64 {
@@ -446,78 +279,5 @@ impl<'a> Evidence<'a> {
             .map(|i| (0..k).map(|m| cross[(i, m)] * eta[m]).sum())
             .collect();
         (solve(&b.s, &rhs).gain / own.max(1e-300)).clamp(0.0, 1.0)
-    }
-
-    /// A whitened residual as it was before, in units of the noise of each actuator; zero where
-    /// nothing was measured.
-    pub fn unwhitened(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let before = residual.par_iter().enumerate();
-        let before = before.map(|(j, e)| self.data.unwhiten(j, e)).collect();
-        self.data.silenced(before)
-    }
-
-    /// What the nominal model leaves of the torque beside a fitted set, by actuator, N m or N; zero
-    /// where nothing was measured.
-    pub fn torque_left(&self, set: &[&Projected]) -> Vec<Vec<f64>> {
-        let mut all = self.unwhitened(&self.residual(set, &self.fit(set)));
-        for (row, noise) in all.iter_mut().zip(&self.data.noise) {
-            row.iter_mut().for_each(|v| *v *= noise.std);
-        }
-        all
-    }
-
-    /// Energies of a whitened residual.
-    pub fn energy(&self, residual: &[Vec<f64>]) -> Energy {
-        let joints = residual
-            .iter()
-            .map(|e| {
-                (0..self.data.records.len())
-                    .map(|k| {
-                        let piece = &e[self.data.span(k)];
-                        dot(piece, piece)
-                    })
-                    .collect()
-            })
-            .collect();
-        Energy { joints }
-    }
-}
-
-/// Sum of products of two columns over fitted rows.
-fn overlap(a: &Column, b: &Column, fitted: usize) -> f64 {
-    a.rows
-        .iter()
-        .filter_map(|(j, x)| Some(dot(&x[..fitted], &b.get(*j)?[..fitted])))
-        .sum()
-}
-
-/// `S η = b` with `S` positive semi-definite, scaled to a unit diagonal first.
-pub fn solve(s: &Mat<f64>, b: &[f64]) -> Fit {
-    let k = b.len();
-    let scale: Vec<f64> = (0..k).map(|i| 1.0 / s[(i, i)].max(1e-300).sqrt()).collect();
-    let a = Mat::from_fn(k, k, |i, m| {
-        s[(i, m)] * scale[i] * scale[m] + if i == m { 1e-10 } else { 0.0 }
-    });
-    let Ok(f) = a.llt(Side::Lower) else {
-        return Fit {
-            gain: 0.0,
-            eta: vec![0.0; k],
-            covariance: vec![vec![0.0; k]; k],
-        };
-    };
-    let rhs = Mat::from_fn(k, 1, |i, _| b[i] * scale[i]);
-    let x = f.solve(&rhs);
-    let inverse = f.solve(Mat::<f64>::identity(k, k));
-    let eta: Vec<f64> = (0..k).map(|i| x[(i, 0)] * scale[i]).collect();
-    Fit {
-        gain: eta.iter().zip(b).map(|(e, b)| e * b).sum(),
-        covariance: (0..k)
-            .map(|i| {
-                (0..k)
-                    .map(|m| inverse[(i, m)] * scale[i] * scale[m])
-                    .collect()
-            })
-            .collect(),
-        eta,
     }
 }

@@ -1,0 +1,100 @@
+//! What a fit leaves: parameters, residuals, energies.
+
+use super::algebra::dot;
+use super::{Energy, Evidence, Fit, Projected};
+use faer::Mat;
+use rayon::prelude::*;
+
+impl Evidence<'_> {
+    /// Parameters of the nominal model that go with a fit of a set.
+    pub fn parameters(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
+        let p = self.d.len();
+        let u = self.reduced(set, fit);
+        // L^T x = u
+        let mut x = Mat::from_fn(p, 1, |i, _| u[i]);
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+            self.l.transpose(),
+            x.as_mut(),
+            faer::Par::Seq,
+        );
+        (0..p)
+            .map(|i| self.phi[i] + self.spread[i] * x[(i, 0)])
+            .collect()
+    }
+
+    fn reduced(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
+        let mut u = self.d.clone();
+        let mut at = 0;
+        for a in set {
+            for i in 0..a.z.len() {
+                for (m, u) in u.iter_mut().enumerate() {
+                    *u -= a.c[(m, i)] * fit.eta[at + i];
+                }
+            }
+            at += a.z.len();
+        }
+        u
+    }
+
+    /// Whitened residual of all rows with a fitted set, by actuator.
+    pub fn residual(&self, set: &[&Projected], fit: &Fit) -> Vec<Vec<f64>> {
+        let u = self.reduced(set, fit);
+        (0..self.data.joints())
+            .into_par_iter()
+            .map(|j| {
+                let y = &self.q[j] * faer::ColRef::from_slice(&u);
+                let mut e: Vec<f64> = self.r[j]
+                    .iter()
+                    .enumerate()
+                    .map(|(i, r)| r - y[i])
+                    .collect();
+                let mut at = 0;
+                for a in set {
+                    for column in &a.z {
+                        if let Some(v) = column.get(j) {
+                            for (e, v) in e.iter_mut().zip(v) {
+                                *e -= fit.eta[at] * v;
+                            }
+                        }
+                        at += 1;
+                    }
+                }
+                e
+            })
+            .collect()
+    }
+
+    /// A whitened residual as it was before, in units of the noise of each actuator; zero where
+    /// nothing was measured.
+    pub fn unwhitened(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let before = residual.par_iter().enumerate();
+        let before = before.map(|(j, e)| self.data.unwhiten(j, e)).collect();
+        self.data.silenced(before)
+    }
+
+    /// What the nominal model leaves of the torque beside a fitted set, by actuator, N m or N; zero
+    /// where nothing was measured.
+    pub fn torque_left(&self, set: &[&Projected]) -> Vec<Vec<f64>> {
+        let mut all = self.unwhitened(&self.residual(set, &self.fit(set)));
+        for (row, noise) in all.iter_mut().zip(&self.data.noise) {
+            row.iter_mut().for_each(|v| *v *= noise.std);
+        }
+        all
+    }
+
+    /// Energies of a whitened residual.
+    pub fn energy(&self, residual: &[Vec<f64>]) -> Energy {
+        let joints = residual
+            .iter()
+            .map(|e| {
+                (0..self.data.records.len())
+                    .map(|k| {
+                        let piece = &e[self.data.span(k)];
+                        dot(piece, piece)
+                    })
+                    .collect()
+            })
+            .collect();
+        Energy { joints }
+    }
+}

@@ -1,0 +1,106 @@
+//! The nominal model, whitened and decomposed under its prior.
+
+use super::Evidence;
+use super::algebra::dot;
+use crate::diagnose::data::Data;
+use faer::{Mat, Side};
+use rayon::prelude::*;
+
+impl<'a> Evidence<'a> {
+    /// With the prior of the data, its deviations multiplied by `loosen`.
+    pub fn new(data: &'a Data<'a>, loosen: f64) -> Self {
+        let n = data.joints();
+        let p = data.parameters.len();
+        let fitted = data.fitted;
+        let phi: Vec<f64> = data.parameters.iter().map(|p| p.value).collect();
+        // a parameter that is exactly zero a priori must still be able to move
+        let floor = 1e-9;
+        let spread: Vec<f64> = data
+            .spread
+            .iter()
+            .map(|s| (s * loosen).max(floor))
+            .collect();
+        let mut w: Vec<Mat<f64>> = (0..n)
+            .into_par_iter()
+            .map(|j| {
+                let mut out = Mat::zeros(data.rows(), p);
+                for c in 0..p {
+                    let from: Vec<f64> = data.w[j].col(c).iter().copied().collect();
+                    if from.iter().all(|v| *v == 0.0) {
+                        continue;
+                    }
+                    for (i, v) in data.modelled(j, &from).into_iter().enumerate() {
+                        out[(i, c)] = v;
+                    }
+                }
+                out
+            })
+            .collect();
+        let nominal = data.model_torque(&phi);
+        let r: Vec<Vec<f64>> = (0..n)
+            .into_par_iter()
+            .map(|j| {
+                let model = data.windowed(&nominal[j]);
+                let raw: Vec<f64> = data.tau[j].iter().zip(&model).map(|(a, b)| a - b).collect();
+                data.whiten(j, &raw)
+            })
+            .collect();
+        let grams: Vec<Mat<f64>> = w
+            .par_iter()
+            .map(|w| {
+                let f = w.subrows(0, fitted);
+                f.transpose() * f
+            })
+            .collect();
+        // scaled by the prior, so that the matrix is 1 + something
+        let mut a = Mat::<f64>::identity(p, p);
+        for g in &grams {
+            for i in 0..p {
+                for k in 0..p {
+                    a[(i, k)] += g[(i, k)] * spread[i] * spread[k];
+                }
+            }
+        }
+        let l = match a.llt(Side::Lower) {
+            Ok(f) => f.L().to_owned(),
+            Err(_) => Mat::identity(p, p),
+        };
+        // Q = W diag(spread) L⁻ᵀ: solve L Qᵀ = (W diag(spread))ᵀ
+        w.par_iter_mut().for_each(|w| {
+            for c in 0..p {
+                for i in 0..w.nrows() {
+                    w[(i, c)] *= spread[c];
+                }
+            }
+            let mut t = w.transpose().to_owned();
+            faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+                l.as_ref(),
+                t.as_mut(),
+                faer::Par::Seq,
+            );
+            *w = t.transpose().to_owned();
+        });
+        let q = w;
+        let mut d = vec![0.0; p];
+        let mut rr = 0.0;
+        for j in 0..n {
+            for (c, d) in d.iter_mut().enumerate() {
+                let column = q[j].col(c);
+                let column = column.try_as_col_major().expect("column major").as_slice();
+                *d += dot(&column[..fitted], &r[j][..fitted]);
+            }
+            rr += dot(&r[j][..fitted], &r[j][..fitted]);
+        }
+        let j0 = rr - dot(&d, &d);
+        Evidence {
+            data,
+            phi,
+            q,
+            l,
+            r,
+            d,
+            j0,
+            spread,
+        }
+    }
+}

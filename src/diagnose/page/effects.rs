@@ -1,0 +1,119 @@
+//! Which effects were found, and how far the gap shrinks with them.
+
+use super::Diagnosis;
+use crate::diagnose::finding::Finding;
+use crate::diagnose::verdict::Verdict;
+use crate::report::format::{percent, significant};
+use crate::report::html::{details, table};
+use maud::{Markup, html};
+
+pub(super) fn effects(d: &Diagnosis) -> Markup {
+    if d.findings.is_empty() {
+        return html! { p { "No effect stands out: " (match d.verdict {
+            Verdict::NoGap => "there is nothing to explain.",
+            _ => "none of the catalogue explains a share of the gap that holds on holdout records.",
+        }) } };
+    }
+    let row = |f: &Finding| {
+        vec![
+            html! {
+                @if f.is_claim() { strong { (f.title) } } @else { (f.title) }
+                div class="code" { (f.equation) }
+            },
+            html! { @if f.joints.is_empty() { "whole robot" } @else { (f.joints.join(", ")) } },
+            html! { (percent(f.confidence)) },
+            html! { (percent(f.explains)) @if f.member { div { small { (percent(f.interval[0])) "–" (percent(f.interval[1])) } } } },
+            html! { (percent(f.holdout)) },
+            html! { (percent(f.visibility)) @if f.frozen { div { small { "against the prior" } } } },
+            html! {
+                @if let Some(d) = f.decoys { (percent(d)) } @else { "–" }
+                div { small { @if let Some(u) = f.unsteady { "unsteady " (percent(u)) } } }
+            },
+            values(f),
+            html! { @if f.same.is_empty() { "–" } @else { (f.same.join(", ").replace('_', " ")) } },
+        ]
+    };
+    let head = [
+        "effect",
+        "where",
+        "confidence",
+        "explains",
+        "on holdout",
+        "visible",
+        "decoys",
+        "parameters (95 %)",
+        "not told from",
+    ];
+    let (set, rest): (Vec<&Finding>, Vec<&Finding>) = d.findings.iter().partition(|f| f.member);
+    html! {
+        p { "An effect is claimed from a confidence of 50 % on. " strong { "Explains" } " is the share of the gap above the \
+            noise that goes when the effect is added to the others; " strong { "visible" } " the share of the effect that the \
+            nominal model cannot absorb by other parameters; " strong { "decoys" } " the most that the effect explains of its own when it \
+            is moved in time, over what it explains in place: near 100 % it is as good as any signal; " strong { "unsteady" } " \
+            what coefficients of their own for every record would add to that, near 0 % where it is the same in all." }
+        (table(&head, &[1, 7, 8], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
+        @if !rest.is_empty() {
+            (details("Rivals: what else could stand in their place", table(&head, &[1, 7, 8],
+                &rest.iter().map(|f| row(f)).collect::<Vec<_>>())))
+        }
+    }
+}
+
+fn values(f: &Finding) -> Markup {
+    html! {
+        @for v in &f.values {
+            div class="value" {
+                (v.name.replace('_', " ")) " " (significant(v.value, 4))
+                @if let Some(s) = v.std { @if s > 0.0 { " ± " (significant(1.96 * s, 2)) } }
+                " " (v.unit)
+            }
+        }
+    }
+}
+
+pub(super) fn shrink(d: &Diagnosis) -> Markup {
+    let rows: Vec<Vec<Markup>> = d
+        .records
+        .iter()
+        .map(|r| {
+            let mean = |i: usize| {
+                let n = r.joints.len() as f64;
+                (r.joints.iter().map(|v| v[i]).sum::<f64>() / n).sqrt()
+            };
+            let [a, b, c] = [mean(0), mean(1), mean(2)];
+            let share = if b > 0.0 { 1.0 - (c / b).powi(2) } else { 0.0 };
+            vec![
+                html! { (r.name) @for remark in &r.remarks { div { small { (remark) } } } },
+                html! { (if r.fit { "fit" } else { "holdout" }) },
+                html! { (significant(a, 3)) },
+                html! { (significant(b, 3)) },
+                html! { (significant(c, 3)) },
+                html! { (percent(share.max(0.0))) },
+            ]
+        })
+        .collect();
+    let mut total = 0.0;
+    let steps: Vec<Vec<Markup>> = d
+        .findings
+        .iter()
+        .filter(|f| f.member)
+        .map(|f| {
+            total += f.holdout;
+            vec![
+                html! { (f.title) },
+                html! { (percent(f.explains)) },
+                html! { (percent(f.holdout)) },
+                html! { (percent(total.clamp(0.0, 1.0))) },
+            ]
+        })
+        .collect();
+    html! {
+        p { "Gap of all joints in multiples of their noise (root of the mean energy above the noise), record by record. Holdout records were \
+            not fitted to." }
+        (table(&["record", "use", "frozen", "refitted", "with the effects", "of the energy gone"], &[1], &rows))
+        @if !steps.is_empty() {
+            h3 { "Effect by effect" }
+            (table(&["effect", "of the fitted gap", "of the holdout gap", "sum on holdout"], &[], &steps))
+        }
+    }
+}

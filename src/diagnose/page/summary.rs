@@ -1,0 +1,73 @@
+//! The tiles at the top, and what the data cannot say.
+
+use super::Diagnosis;
+use crate::report::format::{percent, significant};
+use crate::report::html::{details, table, tiles};
+use maud::{Markup, html};
+
+pub(super) fn summary(d: &Diagnosis) -> Markup {
+    let worst = (0..d.joints.len())
+        .max_by(|a, b| d.refit[*a].share.total_cmp(&d.refit[*b].share))
+        .unwrap_or(0);
+    let g = &d.refit[worst];
+    let shrink = 1.0 - d.holdout[1] / d.holdout[0].max(1e-9);
+    let share = |s: Option<f64>| s.map_or("–".to_string(), percent);
+    let all = [
+        (
+            format!("{} ×", significant(g.rms / g.noise, 3)),
+            "gap over noise after a refit".into(),
+            format!(
+                "{}: {} {} rms over a noise of {}",
+                g.joint,
+                significant(g.rms, 3),
+                d.units[worst],
+                significant(g.noise, 3)
+            ),
+        ),
+        (
+            percent(shrink.max(0.0)),
+            "of the gap gone on holdout records".into(),
+            "with the effects found, parameters from the fitted records".into(),
+        ),
+        (
+            format!(
+                "{} / {} / {}",
+                share(d.shares.odd),
+                share(d.shares.even),
+                share(d.shares.non_periodic)
+            ),
+            "odd / even / not repeating".into(),
+            match (d.shares.odd, d.shares.non_periodic) {
+                (None, None) => "no record repeats: this cannot be said".into(),
+                (None, _) => "odd and even need a motion of odd harmonics".into(),
+                _ => "shares of the refitted gap".to_string(),
+            },
+        ),
+        (
+            d.bound.map_or("–".into(), percent),
+            "any function of the state could explain".into(),
+            "bins of position and velocity of each joint, tried on other periods".into(),
+        ),
+    ];
+    tiles(&all)
+}
+
+pub(super) fn limits(d: &Diagnosis) -> Markup {
+    html! {
+        @if d.untestable.is_empty() {
+            p { "Every effect of the catalogue shows in this motion by more than one percent." }
+        } @else {
+            p { "The nominal model absorbs more than 99 % of these effects in this motion. They are untestable here, not absent:" }
+            (details("Untestable effects", table(&["effect", "where", "visible"], &[1],
+                &d.untestable.iter().map(|(e, p, v)| vec![
+                    html! { (e.replace('_', " ")) },
+                    html! { @if p.is_empty() { "whole robot" } @else { (p) } },
+                    html! { (percent(*v)) },
+                ]).collect::<Vec<_>>())))
+        }
+        @if !d.warnings.is_empty() {
+            h3 { "Warnings" }
+            ul { @for w in &d.warnings { li { (w.to_string()) } } }
+        }
+    }
+}
