@@ -27,6 +27,7 @@ impl Data<'_> {
         }
         // without repetition: the torque above the band of the motion
         let longest = self.records.iter().max_by_key(|r| r.count);
+        // `prepare` refuses an experiment without a record to fit to
         let r = longest.expect("there are records");
         Noise::from_residual(r.torque(j), r.dt, T.noise.above * r.band)
     }
