@@ -19,6 +19,7 @@ mod motions;
 mod trial;
 
 use super::catalogue::{Context, Effect};
+use super::data::Data;
 use super::evidence::Evidence;
 use super::finding::Finding;
 use super::search::Candidate;
@@ -233,7 +234,7 @@ fn names(target: &Target) -> Vec<&'static str> {
     }
 }
 
-fn why(target: &Target, also: &[&Target], overlap: [f64; 2], data: &super::Data) -> String {
+fn why(target: &Target, also: &[&Target], overlap: [f64; 2], data: &Data) -> String {
     let actuators = data.plant.actuators();
     let joints: Vec<String> = actuators.iter().map(|j| j.name.clone()).collect();
     let [now, then] = overlap.map(|o| 100.0 * o);
