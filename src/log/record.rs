@@ -1,8 +1,10 @@
 //! A log of a robot: which column is what, repaired and put on an even time grid.
 
+mod checks;
+
 use super::clock::{self, Clock};
-use super::resample::{Order, fill, interpolate};
-use super::{Payload, Purpose, Record, Table, channels};
+use super::resample::{Order, interpolate};
+use super::{Payload, Purpose, Record, Table};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::Joint;
@@ -13,10 +15,6 @@ const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 /// Groups of one column an actuator.
 const GROUPS: [&str; 8] = ["tau", "ddq", "dq", "qref", "ql", "q", "pa", "pb"];
 
-/// Shortest period of a motion, in samples.
-const SHORTEST: f64 = 4.0;
-/// Longest period of a motion, in lengths of the record.
-const LONGEST: f64 = 1e3;
 /// Most samples of the even grid, in rows of the log.
 const MOST: usize = 30;
 
@@ -254,139 +252,6 @@ impl Record {
         out
     }
 
-    /// Interpolates dropped values, marks them, and names their channels.
-    fn fill_dropped(&mut self, clock: &Clock) -> Result<()> {
-        let path = self.path.clone();
-        let mut valid = std::mem::take(&mut self.valid);
-        let mut warnings = Vec::new();
-        for (name, order, column) in self.channels() {
-            let holes: Vec<usize> = (0..column.len())
-                .filter(|&i| !column[i].is_finite())
-                .collect();
-            let Some(&first) = holes.first() else {
-                continue;
-            };
-            if holes.len() == column.len() {
-                let message = "it holds no number at all: the channel was not recorded";
-                return Err(Error::file(&path, format!("column {name}"), message));
-            }
-            fill(&clock.t, column, order);
-            for &i in &holes {
-                valid[i] = false;
-            }
-            warnings.push(Warning::new(WarningKind::SamplesLeftOut,
-                format!("{}: {name}", path.display()),
-                format!(
-                    "{} of {} values were dropped, the first at {:.4} s; interpolated for the filters and \
-                     left out of the fit",
-                    holes.len(),
-                    column.len(),
-                    clock.t[first]
-                ),
-            ));
-        }
-        self.valid = valid;
-        self.warnings.extend(warnings);
-        Ok(())
-    }
-
-    /// Looks for saturated and stuck channels, joints that do not move, and other units.
-    fn check_channels(&mut self, joints: &[&Joint]) -> Result<()> {
-        let subject = self.path.display().to_string();
-        let step = self.step;
-        let moving: Vec<Vec<bool>> = self
-            .q
-            .par_iter()
-            .map(|q| channels::moving(q, step))
-            .collect();
-        let still: Vec<usize> = (0..joints.len())
-            .filter(|&j| !moving[j].contains(&true))
-            .collect();
-        if still.len() == joints.len() {
-            return Err(Error::file(
-                &self.path,
-                "",
-                "nothing moves in it: no position changes",
-            ));
-        }
-        for &j in &still {
-            self.warnings.push(Warning::new(
-                WarningKind::JointNotMoving,
-                format!("{subject}: q{}", j + 1),
-                format!(
-                    "{} does not move; only what the others show of it can be identified",
-                    joints[j].name
-                ),
-            ));
-        }
-        let any: Vec<bool> = (0..self.valid.len())
-            .map(|i| moving.iter().any(|m| m[i]))
-            .collect();
-        for (j, joint) in joints.iter().enumerate() {
-            self.warnings
-                .extend(channels::position_unit(joint, &self.q[j]));
-            let name = format!("{subject}: tau{}", j + 1);
-            if let Some(tau) = self.tau.get(j) {
-                if let Some((count, level)) =
-                    channels::saturated(tau, joint.limits.effort, &mut self.valid)
-                {
-                    self.warnings.push(Warning::new(WarningKind::SamplesLeftOut,
-                        name.clone(),
-                        format!(
-                            "it stands at {level:.6} for {count} samples as a saturated channel does; they \
-                             were left out of the fit"
-                        ),
-                    ));
-                }
-                if let Some(run) = channels::stuck(tau, step, &any, &mut self.valid) {
-                    self.warnings.push(stuck(name, run, step));
-                }
-            }
-            // an encoder that stands still is stuck if the command goes on
-            if let Some(qref) = &self.qref {
-                let (q, qref) = (&self.q[j], &qref[j]);
-                if let Some(run) = channels::stuck_encoder(q, qref, step, &mut self.valid) {
-                    self.warnings
-                        .push(stuck(format!("{subject}: q{}", j + 1), run, step));
-                }
-            }
-        }
-        let bad = self.valid.iter().filter(|v| !**v).count();
-        if 2 * bad > self.valid.len() {
-            self.warnings.push(Warning::new(
-                WarningKind::FewSoundSamples,
-                subject,
-                format!(
-                    "only {} of {} samples are sound in all channels",
-                    self.valid.len() - bad,
-                    self.valid.len()
-                ),
-            ));
-        }
-        Ok(())
-    }
-
-    /// A stated period that samples cannot resolve, or that is far longer than the record of
-    /// `duration` seconds, is none.
-    fn drop_wrong_period(&mut self, step: f64, duration: f64) {
-        let Some(period) = self.period else { return };
-        let found = if period < SHORTEST * step {
-            format!("is shorter than {SHORTEST} samples ({step:.6} s each)")
-        } else if period > LONGEST * duration {
-            format!("is more than {LONGEST} times as long as the record ({duration:.3} s)")
-        } else {
-            return;
-        };
-        self.warnings.push(Warning::new(
-            WarningKind::NotPeriodic,
-            self.path.display().to_string(),
-            format!(
-                "the stated period of {period} s {found}: it is treated as not periodic; period is in seconds"
-            ),
-        ));
-        self.period = None;
-    }
-
     /// Puts all channels on an even grid; with a period, on one that divides it.
     fn resample(&mut self, clock: &Clock) -> Result<()> {
         let (first, last) = (clock.t[0], clock.t[clock.t.len() - 1]);
@@ -436,61 +301,4 @@ impl Record {
         self.resampled = true;
         Ok(())
     }
-
-    /// Whether the motion repeats with the period that was stated.
-    fn check_period(&mut self) {
-        let Some((each, count)) = self.periods() else {
-            return;
-        };
-        let subject = self.path.display().to_string();
-        let period = self.period.unwrap_or_default();
-        if count < 2 {
-            self.warnings.push(Warning::new(
-                WarningKind::NotPeriodic,
-                subject,
-                format!(
-                    "it is {:.3} s long, less than two periods of {period} s: nothing to average",
-                    self.step * self.len() as f64
-                ),
-            ));
-            return;
-        }
-        // scatter against the mean period, relative to the motion, from the second period on
-        let (mut scatter, mut motion) = (0.0, 0.0);
-        for q in &self.q {
-            let from = q.len() - each * (count - 1);
-            for i in 0..each {
-                let values = (0..count - 1).map(|p| q[from + p * each + i]);
-                let mean = values.clone().sum::<f64>() / (count - 1) as f64;
-                let first = q[from - each + i];
-                scatter += values.map(|x| (x - mean) * (x - mean)).sum::<f64>()
-                    + 0.25 * (first - mean).powi(2);
-            }
-            let mean = q.iter().sum::<f64>() / q.len() as f64;
-            motion += q.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
-        }
-        if scatter > 0.02 * motion {
-            self.warnings.push(Warning::new(WarningKind::NotPeriodic,
-                subject,
-                format!(
-                    "the motion does not repeat after the stated period of {period} s (scatter {:.0} % of \
-                     the motion); it is treated as not periodic",
-                    100.0 * (scatter / motion).sqrt()
-                ),
-            ));
-            self.period = None;
-        }
-    }
-}
-
-fn stuck(name: String, (runs, samples, first): (usize, usize, usize), step: f64) -> Warning {
-    Warning::new(
-        WarningKind::SamplesLeftOut,
-        name,
-        format!(
-            "it stands still {runs} times, {samples} samples in all, while the robot moves (first at \
-             {:.3} s): stuck or dropped; left out of the fit",
-            first as f64 * step
-        ),
-    )
 }
