@@ -127,6 +127,10 @@ warning_kinds! {
     InertiaImpossible = "inertia_impossible",
     /// An inertia was changed to fit what the file says of it, such as identical legs.
     InertiaChanged = "inertia_changed",
+    /// The geometry of a link cannot be read or was changed: its volume is unknown or scaled.
+    GeometryUnread = "geometry_unread",
+    /// Collisions are looked at in part or not at all; the message says what was left out.
+    CollisionNotChecked = "collision_not_checked",
     /// A kinematic loop does not close exactly; it is closed as well as possible.
     LoopOpen = "loop_open",
     /// There are more actuators than freedoms; the forces of least norm are used.

@@ -85,6 +85,8 @@ pub mod report;
 pub mod robot;
 pub mod signals;
 pub mod simulate;
+#[doc(hidden)]
+pub mod solid;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning, WarningKind};

@@ -100,6 +100,8 @@ pub struct Args {
     /// offset, or none [default: as in the robot file]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
+    #[command(flatten)]
+    collisions: super::Collisions,
     /// Print report.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
@@ -113,6 +115,7 @@ fn named<T: serde::de::DeserializeOwned>(text: &str) -> std::result::Result<T, S
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let plant = load(&args.robot, args.identify.as_deref())?.in_space(args.coordinates)?;
+    let plant = args.collisions.apply(plant);
     let settings = Settings {
         harmonics: args.harmonics,
         period: args.period,

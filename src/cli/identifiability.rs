@@ -34,6 +34,8 @@ pub struct Args {
     /// offset, or none [default: as in the robot file]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
+    #[command(flatten)]
+    collisions: super::Collisions,
     /// Print report.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
@@ -41,7 +43,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let mut plant = load(&args.robot, args.identify.as_deref())?;
+    let mut plant = args.collisions.apply(load(&args.robot, args.identify.as_deref())?);
     let trajectory = args.trajectory.as_ref().map(Trajectory::read).transpose()?;
     if let (Some(t), Some(path)) = (&trajectory, &args.trajectory) {
         plant = plant

@@ -112,6 +112,27 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
     Ok(plant.with_terms(&terms))
 }
 
+/// How collisions are looked at.
+#[derive(clap::Args)]
+struct Collisions {
+    /// Look at no collisions: neither of the robot with itself nor with what stands around it
+    #[arg(long)]
+    no_collision: bool,
+    /// Folder in which package:// meshes are looked for, before the robot file's own and
+    /// ROS_PACKAGE_PATH; may be given several times
+    #[arg(long, value_name = "FOLDER")]
+    meshes: Vec<PathBuf>,
+}
+
+impl Collisions {
+    fn apply(&self, plant: Plant) -> Plant {
+        match self.no_collision {
+            true => plant.without_collisions(),
+            false => plant.with_meshes(&self.meshes),
+        }
+    }
+}
+
 /// The directory that a run writes its files to.
 struct Folder {
     dir: PathBuf,

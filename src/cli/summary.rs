@@ -67,6 +67,27 @@ fn excitation(e: &Excitation) -> String {
         ),
         None => writeln!(out, "limits: none stated"),
     };
+    match &e.clearance {
+        None => out.push_str("collisions: not looked at\n"),
+        Some(c) => {
+            let verdict = match c.certificate.satisfied {
+                true if c.certificate.unseen.is_empty() => "none",
+                true => "none of what was looked at",
+                false => "TOO NEAR, do not run this",
+            };
+            if let Some(p) = c.certificate.pairs.first() {
+                let _ = writeln!(
+                    out,
+                    "collisions: {verdict}; closest: {} and {}, {:.1} mm at {:.2} s (never below {:.1} mm)",
+                    p.between[0],
+                    p.between[1],
+                    1e3 * p.least,
+                    p.time,
+                    1e3 * p.bound
+                );
+            }
+        }
+    }
     if let Some(p) = e.predictions.first() {
         let good = e
             .predictions

@@ -3,9 +3,11 @@
 //! A pair is a volume of one body and a volume of another body, of the base, or an obstacle. Bodies that a
 //! joint joins and pairs that the user names are left out.
 
-use super::distance::{Separation, separation, separation_from_plane};
-use super::shape::{Pose, Shape};
+use crate::solid::distance::{Separation, separation, separation_from_plane};
+use crate::solid::shape::{Pose, Shape};
+pub use crate::robot::geometry::Obstacle;
 use crate::robot::{Motion, Robot};
+use crate::error::Warning;
 use nalgebra::{Rotation3, Unit, Vector3};
 
 /// A volume of the robot.
@@ -19,36 +21,6 @@ pub struct Volume {
     pub shape: Shape,
 }
 
-/// A fixed thing in the base frame.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Obstacle {
-    /// what lies below `normalᵀ x = offset`: a floor, a table, a wall, a ceiling
-    Plane {
-        /// name in reports
-        name: String,
-        /// unit normal, away from the solid
-        normal: Vector3<f64>,
-        /// m
-        offset: f64,
-    },
-    /// a convex thing
-    Solid {
-        /// name in reports
-        name: String,
-        /// in the base frame
-        shape: Shape,
-    },
-}
-
-impl Obstacle {
-    /// Name in reports.
-    pub fn name(&self) -> &str {
-        match self {
-            Obstacle::Plane { name, .. } | Obstacle::Solid { name, .. } => name,
-        }
-    }
-}
-
 /// Second partner of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Partner {
@@ -59,12 +31,23 @@ pub enum Partner {
 }
 
 /// Two things that must stay apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// index into [`Scene::volumes`], of a body that moves
     pub volume: usize,
     /// what it must not touch
     pub partner: Partner,
+    /// least distance that is allowed, m
+    pub margin: f64,
+}
+
+/// Two things that are not looked at, and why.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct LeftOut {
+    /// names of the two
+    pub between: [String; 2],
+    /// reason in words
+    pub why: String,
 }
 
 /// Everything that can collide.
@@ -76,8 +59,16 @@ pub struct Scene {
     pub obstacles: Vec<Obstacle>,
     /// what must stay apart
     pub pairs: Vec<Pair>,
-    /// least distance that is allowed, m
+    /// what is not looked at
+    pub left_out: Vec<LeftOut>,
+    /// links whose volume is not known
+    pub unseen: Vec<String>,
+    /// least distance of two things where nothing else is stated, m
     pub margin: f64,
+    /// postures of all joints, free of contact, the most spacious first
+    pub free: Vec<Vec<f64>>,
+    /// what was imperfect
+    pub warnings: Vec<Warning>,
 }
 
 /// Poses of all bodies in the base frame at one posture, parents before children.
@@ -169,35 +160,5 @@ impl Scene {
         if let Partner::Volume(v) = pair.partner {
             carry(self.volumes[v].body, &s.on_second, 1.0);
         }
-    }
-
-    /// All pairs but those of one body, of bodies joined by a joint, of two things that do not move, and
-    /// those that `ignored` names.
-    pub fn all_pairs(&self, robot: &Robot, ignored: impl Fn(&str, &str) -> bool) -> Vec<Pair> {
-        let joined = |a: Option<usize>, b: Option<usize>| {
-            let parent = |x: Option<usize>| x.map(|b| robot.bodies[b].parent);
-            a == b || parent(a) == Some(b) || parent(b) == Some(a)
-        };
-        let mut out = Vec::new();
-        for (i, a) in self.volumes.iter().enumerate() {
-            for (k, b) in self.volumes.iter().enumerate().skip(i + 1) {
-                if joined(a.body, b.body) || ignored(&a.link, &b.link) {
-                    continue;
-                }
-                // the first one moves
-                let (volume, other) = if a.body.is_some() { (i, k) } else { (k, i) };
-                let partner = Partner::Volume(other);
-                out.push(Pair { volume, partner });
-            }
-            if a.body.is_some() {
-                let free = (0..self.obstacles.len())
-                    .filter(|o| !ignored(&a.link, self.obstacles[*o].name()));
-                out.extend(free.map(|o| Pair {
-                    volume: i,
-                    partner: Partner::Obstacle(o),
-                }));
-            }
-        }
-        out
     }
 }

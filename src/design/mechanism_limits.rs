@@ -392,7 +392,13 @@ fn peaks(used: &[f64], from: f64) -> Vec<(usize, f64)> {
 }
 
 impl PathLimits for MechanismLimits<'_> {
-    fn used(&self, _info: &Information, motion: &Samples, memory: &mut PathMemory) -> f64 {
+    fn used(
+        &self,
+        _info: &Information,
+        _: &[f64],
+        motion: &Samples,
+        memory: &mut PathMemory,
+    ) -> f64 {
         if !self.evaluate(motion, memory) {
             return f64::INFINITY;
         }
@@ -408,7 +414,7 @@ impl PathLimits for MechanismLimits<'_> {
         most
     }
 
-    fn rows(&self, info: &Information, e: &mut Evaluation, from: f64) -> Vec<PathRow> {
+    fn rows(&self, info: &Information, _: &[f64], e: &mut Evaluation, from: f64) -> Vec<PathRow> {
         let mut memory = PathMemory::default();
         let mut rows = Vec::new();
         if !self.evaluate(&e.motion, &mut memory) {
@@ -420,7 +426,7 @@ impl PathLimits for MechanismLimits<'_> {
         rows
     }
 
-    fn broken(&self, _info: &Information, motion: &Samples) -> String {
+    fn broken(&self, _info: &Information, _: &[f64], motion: &Samples) -> String {
         match self.worst(motion, &mut PathMemory::default()) {
             (used, why) if used.is_infinite() => why,
             (used, what) if used > 1.0 => {

@@ -13,6 +13,7 @@
 //! numbers and rounds are compared in a fixed order, so the result is the same for the same seed
 //! whatever the number of threads, unless a time limit ends the run.
 
+mod clearance;
 #[doc(hidden)]
 pub mod criterion;
 #[doc(hidden)]
@@ -38,15 +39,18 @@ pub use result::{Control, Design, Progress};
 pub use settings::Settings;
 
 use crate::base::BaseParameters;
+use crate::collision::Scene;
 use crate::error::{Error, Result};
 use crate::plant::Plant;
 use crate::robot::{JointTerm, Robot};
 use crate::trajectory::Basis;
+use clearance::ClearanceLimits;
 use information::Information;
 use limits::Limits;
 use mechanism_limits::MechanismLimits;
-use path::PathLimits;
+use path::{All, PathLimits};
 use problem::{Problem, first_certified};
+use std::sync::Arc;
 use std::time::Instant;
 use torque::TorqueLimits;
 
@@ -104,10 +108,11 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
     let transform = transform(&base, settings);
     let (period, derate) = (settings.period, settings.derate);
     let info = Information::new(plant, &basis, period, count, transform, weights);
+    let scene = plant.scene()?;
     first_certified(|tighter| {
         let share = derate * tighter;
         let path: Option<Box<dyn PathLimits + '_>> = match plant.mechanism() {
-            None => TorqueLimits::new(plant.robot(), share).map(|t| Box::new(t) as _),
+            None => along_tree(plant, share, tighter, &basis, period, scene.clone()),
             Some(m) => Some(Box::new(MechanismLimits::new(m, share, period, count))),
         };
         let mut limits = Limits::new(moved, &basis, period, derate);
@@ -124,6 +129,27 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
         }
         .solve(begin, control)
     })
+}
+
+/// Torques and clearances of a tree, where there is anything to keep.
+fn along_tree<'a>(
+    plant: &'a Plant,
+    share: f64,
+    tighter: f64,
+    basis: &Basis,
+    period: f64,
+    scene: Option<Arc<Scene>>,
+) -> Option<Box<dyn PathLimits + 'a>> {
+    let robot = plant.robot();
+    let mut all: Vec<Box<dyn PathLimits + 'a>> = Vec::new();
+    if let Some(torques) = TorqueLimits::new(robot, share) {
+        all.push(Box::new(torques));
+    }
+    if let Some(scene) = scene {
+        let clear = ClearanceLimits::new(scene, robot, basis, period, tighter);
+        all.push(Box::new(clear));
+    }
+    (!all.is_empty()).then(|| Box::new(All(all)) as _)
 }
 
 fn something_to_identify(name: &str, base: &BaseParameters) -> Result<()> {

@@ -184,7 +184,7 @@ impl Problem<'_> {
         let mut motion = Default::default();
         self.info.sample(&rest, &mut motion);
         let broken = match self.path {
-            Some(path) => path.broken(self.info, &motion),
+            Some(path) => path.broken(self.info, &rest, &motion),
             None => String::new(),
         };
         match broken.is_empty() {

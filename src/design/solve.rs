@@ -266,7 +266,7 @@ impl State {
             c.gradients.iter_mut().for_each(scale);
         }
         let path_rows = match task.path {
-            Some(limits) => limits.rows(task.info, e, 0.8),
+            Some(limits) => limits.rows(task.info, x, e, 0.8),
             None => Vec::new(),
         };
         Ok(Point {
@@ -289,8 +289,9 @@ impl State {
     ) -> Result<Option<Step>> {
         let (n, m) = (x.len(), task.free());
         let mut rows = task.limits.rows(x, NEAR, &mut self.work);
+        let mut path_rows = here.path_rows.clone();
         for round in 1.. {
-            self.fill(task, here, hessian, damping, &rows, n);
+            self.fill(task, here, hessian, damping, &rows, &path_rows, n);
             let mut settings = ConicSettings::fast();
             if let Some(deadline) = task.deadline {
                 let left = deadline.saturating_duration_since(Instant::now());
@@ -306,7 +307,13 @@ impl State {
             if round < ROUNDS {
                 let before = rows.len();
                 task.limits.cut(x, &next, &mut rows, &mut self.work);
-                if rows.len() > before {
+                let mut more = match task.path {
+                    Some(path) => path.cuts(task.info, x, &next),
+                    None => Vec::new(),
+                };
+                let missed = !more.is_empty();
+                path_rows.append(&mut more);
+                if rows.len() > before || missed {
                     continue;
                 }
             }
@@ -332,6 +339,7 @@ impl State {
         hessian: Option<&Mat<f64>>,
         damping: f64,
         rows: &[Row],
+        path_rows: &[PathRow],
         n: usize,
     ) {
         let m = task.free();
@@ -367,7 +375,7 @@ impl State {
                 .map(|(k, r)| (row.joint * m + k, r * s));
             p.inequality(entries, row.slack);
         }
-        for row in &here.path_rows {
+        for row in path_rows {
             let scaled = row.gradient.iter().enumerate();
             p.inequality(scaled.map(|(k, g)| (k, g * task.scale[k / m])), row.slack);
         }
@@ -381,7 +389,7 @@ impl State {
         for _ in 0..10 {
             let motion = &mut self.evaluation.motion;
             task.info.sample(next, motion);
-            if limits.used(task.info, motion, &mut self.path) <= 1.0 {
+            if limits.used(task.info, next, motion, &mut self.path) <= 1.0 {
                 return true;
             }
             next.iter_mut()

@@ -47,6 +47,13 @@ pub struct Source<'a> {
     pub seed: u64,
 }
 
+/// Coefficients of a joint that stands still.
+fn constant(position: f64, harmonics: usize) -> Vec<f64> {
+    let mut c = vec![0.0; 2 * harmonics + 1];
+    c[0] = position;
+    c
+}
+
 impl Source<'_> {
     fn stream(&self, number: usize) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
@@ -107,6 +114,7 @@ impl Source<'_> {
         let mut work = ExtremaWork::default();
         let mut x = Vec::with_capacity(self.task.info.len());
         let mut rest = Vec::with_capacity(self.task.info.len());
+        let centre = self.centre(rng);
         for (j, joint) in self.robot.joints.iter().enumerate() {
             let scale = self.task.scale[j];
             let half = match joint.limits.position {
@@ -114,7 +122,10 @@ impl Source<'_> {
                 _ => scale,
             };
             let mut c = vec![0.0; 2 * h + 1];
-            c[0] = limits.rest(j) + half * rng.random_range(-0.3..0.3);
+            c[0] = match centre {
+                Some(posture) => posture[j],
+                None => limits.rest(j) + half * rng.random_range(-0.3..0.3),
+            };
             for k in 0..h {
                 let weight = 1.0 / f64::from(basis.harmonics[k]).sqrt();
                 for at in [1 + k, 1 + h + k] {
@@ -122,6 +133,21 @@ impl Source<'_> {
                 }
             }
             let full = basis.parameters(j, &c);
+            if centre.is_some() {
+                let still = basis.parameters(j, &constant(c[0], h));
+                let mut factor = rng.random_range(0.6..0.98);
+                let mut own: Vec<f64>;
+                loop {
+                    own = (0..m).map(|k| still[k] + factor * (full[k] - still[k])).collect();
+                    if limits.gauge(j, &own, &mut work) <= 1.0 || factor < 1e-6 {
+                        break;
+                    }
+                    factor *= 0.85;
+                }
+                x.extend(own);
+                rest.extend(still.iter());
+                continue;
+            }
             let gauge = limits.gauge(j, full.as_slice(), &mut work);
             let factor = rng.random_range(0.6..0.98) / gauge.max(1e-9);
             let still = limits.rest_parameters(j);
@@ -129,6 +155,17 @@ impl Source<'_> {
             rest.extend(still);
         }
         self.fit_path(&x, &rest)
+    }
+
+    /// A posture to move about, where the limits along the path know some; the more spacious ones more often.
+    /// None where the start is prescribed.
+    fn centre(&self, rng: &mut ChaCha8Rng) -> Option<&[f64]> {
+        let free = self.task.path.map(|p| p.postures()).unwrap_or_default();
+        if free.is_empty() || self.basis.start.is_some() {
+            return None;
+        }
+        let at = rng.random_range(0.0..1.0_f64).powi(2) * free.len() as f64;
+        Some(&free[(at as usize).min(free.len() - 1)])
     }
 
     /// The largest of a few steps from a feasible trajectory towards another that keeps the limits along the path.
@@ -145,7 +182,7 @@ impl Source<'_> {
                 .map(|(x, r)| r + fraction * (x - r))
                 .collect();
             self.task.info.sample(&trial, &mut motion);
-            if limits.used(self.task.info, &motion, &mut memory) <= 1.0 {
+            if limits.used(self.task.info, &trial, &motion, &mut memory) <= 1.0 {
                 return Some(trial);
             }
             fraction = if attempt == 28 { 0.0 } else { fraction * 0.8 };

@@ -145,7 +145,13 @@ impl TorqueLimits {
 }
 
 impl PathLimits for TorqueLimits {
-    fn used(&self, info: &Information, motion: &Samples, memory: &mut PathMemory) -> f64 {
+    fn used(
+        &self,
+        info: &Information,
+        _: &[f64],
+        motion: &Samples,
+        memory: &mut PathMemory,
+    ) -> f64 {
         let mut tau = std::mem::take(&mut memory.tau);
         self.torques(info, motion, &mut memory.workspace, &mut tau);
         let used = self.worst(&tau).0;
@@ -153,7 +159,7 @@ impl PathLimits for TorqueLimits {
         used
     }
 
-    fn broken(&self, info: &Information, motion: &Samples) -> String {
+    fn broken(&self, info: &Information, _: &[f64], motion: &Samples) -> String {
         let mut tau = Vec::new();
         self.torques(info, motion, &mut Workspace::default(), &mut tau);
         let (used, j) = self.worst(&tau);
@@ -171,7 +177,7 @@ impl PathLimits for TorqueLimits {
         }
     }
 
-    fn rows(&self, info: &Information, e: &mut Evaluation, from: f64) -> Vec<PathRow> {
+    fn rows(&self, info: &Information, _: &[f64], e: &mut Evaluation, from: f64) -> Vec<PathRow> {
         let (count, dof) = (e.motion.count, e.motion.dof);
         let step = count * dof;
         let mut tau = Vec::new();

@@ -4,7 +4,7 @@ use super::page::reproduce::seed;
 use super::page::verdict::{verdict, violations};
 use crate::design::record::Record;
 use crate::identifiability::{Assessment, Excitation, Platform};
-use crate::trajectory::Space;
+use crate::trajectory::{Proof, Space};
 use crate::trajectory::certificate::{JointCertificate, Peak};
 use serde_json::{Map, Value, json};
 
@@ -71,6 +71,7 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
     );
     put("relative_std", relative_std(a));
     put("limits", e.map_or(Value::Null, |e| limits(a, e)));
+    put("clearance", e.map_or(Value::Null, clearance));
     put("seconds", number(seconds));
     put("verdict", json!(verdict(a)));
     put("torque_noise", numbers(&a.torque_noise));
@@ -138,6 +139,30 @@ fn relative_std(a: &Assessment) -> Value {
                 .collect()
         }
     }
+}
+
+/// Collisions: how near, where and when, and how that is known.
+fn clearance(e: &Excitation) -> Value {
+    let Some(c) = &e.clearance else {
+        return json!({ "least": null, "between": null, "time": null, "proof": "not_checked" });
+    };
+    let first = c.certificate.pairs.first();
+    json!({
+        "least": first.map(|p| p.least),
+        "between": first.map(|p| &p.between),
+        "time": first.map(|p| p.time),
+        "bound": first.map(|p| p.bound),
+        "margin": first.map(|p| p.margin),
+        "proof": match c.certificate.proof {
+            Proof::Stated => "bounded",
+            _ => "proven",
+        },
+        "satisfied": c.certificate.satisfied,
+        "unseen": c.certificate.unseen,
+        "pairs": c.certificate.pairs,
+        "left_out": c.left_out,
+        "volumes": c.volumes,
+    })
 }
 
 /// The certificate.

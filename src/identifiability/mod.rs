@@ -11,12 +11,14 @@
 //! (white noise, independent between samples and joints; Swevers et al. 1997, eq. 11), whose
 //! diagonal gives the predicted standard deviation of every base parameter.
 
+mod clearance;
 #[doc(hidden)]
 pub mod json;
 #[doc(hidden)]
 pub mod page;
 mod platform;
 
+pub use clearance::{Clearances, LinkVolumes};
 pub use platform::Platform;
 
 use crate::base::BaseParameters;
@@ -83,6 +85,8 @@ pub struct Excitation {
     /// of a parallel robot, what its platform does; `motion` and `certificate` are then about the
     /// actuators
     pub platform: Option<Platform>,
+    /// how near it brings the robot to itself and to what stands around; `None` where that was not looked at
+    pub clearance: Option<Clearances>,
 }
 
 /// The report before the run, of a robot alone or with a trajectory.
@@ -150,6 +154,13 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
              samples is bounded by twice the largest second difference, not proven",
         ));
     }
+    let clearance = match (plant.scene()?, certified.clearance) {
+        (Some(scene), Some(found)) => {
+            all.warnings.extend(scene.warnings.iter().cloned());
+            Some(Clearances::of(plant, &scene, found, &motion)?)
+        }
+        _ => None,
+    };
     let platform = match (plant.mechanism(), certified.mechanism) {
         (Some(m), Some(c)) => Some(Platform::of(m, &motion, c)?),
         _ => None,
@@ -166,6 +177,7 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         predictions,
         certificate: certified.actuators,
         platform,
+        clearance,
         motion: plant.actuator_motion(&motion)?,
     });
     Ok(all)

@@ -2,6 +2,7 @@
 //!
 //! The same report stands for a robot alone; what needs a trajectory is then left out.
 
+mod clearance;
 mod motion;
 mod parameters;
 mod platform;
@@ -59,6 +60,7 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
         }
         sections.push(motion::curves(robot, e));
         sections.push(motion::usage(robot, e));
+        sections.push(clearance::section(e));
     }
     sections.push(parameters::uncertainty(assessment));
     sections.push(spectrum::section(assessment));

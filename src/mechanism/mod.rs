@@ -427,6 +427,7 @@ impl Mechanism {
             prior: self.robot.prior,
             path: self.robot.path.clone(),
             hash: self.robot.hash.clone(),
+            geometry: Default::default(),
         }
     }
 

@@ -2,6 +2,7 @@
 //! that move along its task coordinates.
 
 use super::task::Task;
+use crate::robot::geometry::Geometry;
 use crate::robot::{Body, Inertia, Joint, Motion, Prior, Robot};
 use nalgebra::{Matrix3, Vector3};
 
@@ -128,6 +129,7 @@ impl Builder {
 
     /// The robot.
     pub fn robot(self, name: &str, gravity: Vector3<f64>) -> Robot {
+        let geometry = Geometry::of_bodies(&self.bodies);
         Robot {
             name: name.into(),
             bodies: self.bodies,
@@ -137,6 +139,7 @@ impl Builder {
             warnings: Vec::new(),
             path: None,
             hash: String::new(),
+            geometry,
         }
     }
 }

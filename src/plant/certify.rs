@@ -1,6 +1,6 @@
 //! Proof that a motion keeps all limits for all time.
 
-use super::Plant;
+use super::{ClearanceCertificate, Plant};
 use crate::error::Result;
 use crate::mechanism::MechanismCertificate;
 use crate::regressor::smooth_torque_function;
@@ -23,18 +23,33 @@ pub struct Certified {
     pub mechanism: Option<MechanismCertificate>,
     /// how the kinematic limits of the actuators are known between the samples
     pub proof: Proof,
+    /// what is known of collisions; `None` where they were not looked at
+    pub clearance: Option<ClearanceCertificate>,
 }
 
 impl Certified {
     /// Whether every limit holds for all time.
     pub fn satisfied(&self) -> bool {
-        self.actuators.satisfied
+        self.actuators.satisfied && self.clearance.as_ref().is_none_or(|c| c.satisfied)
     }
 
     /// The limit that is exceeded most, in words; `None` where all hold.
     pub fn broken(&self) -> Option<String> {
         if self.satisfied() {
             return None;
+        }
+        if self.actuators.satisfied
+            && let Some(c) = &self.clearance
+        {
+            let short = c.pairs.iter().find(|p| p.bound < p.margin);
+            return Some(match short {
+                Some(p) => format!(
+                    "{} and {} are {:.4} m apart at {:.3} s (known to be at least {:.4} m), less than the \
+                     margin of {} m",
+                    p.between[0], p.between[1], p.least, p.time, p.bound, p.margin
+                ),
+                None => "a clearance that cannot be evaluated".into(),
+            });
         }
         Some(match &self.actuators.worst {
             Some(w) => {
@@ -73,6 +88,7 @@ impl Plant {
         };
         let found = mechanism.certify(fourier, derate)?;
         Ok(Certified {
+            clearance: self.clearance(fourier)?,
             actuators: overall(&found),
             proof: found.proof,
             mechanism: Some(found),
@@ -104,6 +120,7 @@ impl Plant {
             actuators: kinematic.with_torque(bounds),
             mechanism: None,
             proof: Proof::Exact,
+            clearance: self.clearance(fourier)?,
         })
     }
 }

@@ -17,6 +17,7 @@ mod certify;
 mod follow;
 mod kind;
 mod noise;
+mod scene;
 mod summary;
 mod torque;
 mod values;
@@ -24,17 +25,21 @@ mod values;
 pub use crate::robot::{Column, Parameter};
 pub use certify::Certified;
 #[doc(hidden)]
+pub use scene::SeriesPath;
+pub use scene::{ClearanceCertificate, PairClearance};
+#[doc(hidden)]
 pub use follow::Rates;
 #[doc(hidden)]
 pub use noise::DEFAULT_NOISE;
 
 use crate::base::{self, BaseParameters};
+use crate::collision::Scene;
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
 use crate::mechanism::Mechanism;
 use crate::robot::{Joint, JointTerm, Prior, Robot};
 use crate::trajectory::Space;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A robot: a tree, its actuated joints, its unknowns, and what closes it. See the
 /// [module](self) documentation.
@@ -57,6 +62,9 @@ pub struct Plant {
     parameters: Vec<Parameter>,
     raw: Vec<Column>,
     mechanism: Option<Arc<Mechanism>>,
+    /// whether collisions are looked at
+    collisions: bool,
+    scene: Arc<OnceLock<Option<Arc<Scene>>>>,
 }
 
 impl From<Robot> for Plant {
@@ -69,6 +77,8 @@ impl From<Robot> for Plant {
             parameters: robot.unknowns(),
             raw: robot.columns(),
             mechanism: None,
+            collisions: true,
+            scene: Arc::default(),
             robot,
         }
     }
@@ -94,6 +104,8 @@ impl From<Mechanism> for Plant {
                 .map(|c| unknowns.raw(c).unwrap_or(Column::Nuisance))
                 .collect(),
             mechanism: Some(Arc::new(mechanism)),
+            collisions: true,
+            scene: Arc::default(),
         }
     }
 }
@@ -118,9 +130,15 @@ impl Plant {
 
     /// The same robot with other joint columns in the regressor, the same for every actuator.
     pub fn with_terms(self, terms: &[JointTerm]) -> Self {
-        match self.mechanism {
+        let collisions = self.collisions;
+        let other: Plant = match self.mechanism {
             None => self.robot.with_terms(terms).into(),
             Some(mechanism) => Arc::unwrap_or_clone(mechanism).with_terms(terms).into(),
+        };
+        Plant {
+            collisions,
+            scene: self.scene,
+            ..other
         }
     }
 
@@ -130,22 +148,31 @@ impl Plant {
     /// # Errors
     /// A robot without a platform that is asked for one, and as [`Mechanism::in_actuators`].
     pub fn in_space(self, space: Option<Space>) -> Result<Self> {
-        match (&self.mechanism, space) {
-            (_, None) | (None, Some(Space::Actuators)) => Ok(self),
-            (Some(m), Some(Space::Actuators)) => Ok(m.in_actuators()?.into()),
-            (Some(m), _) if m.platform().space() == Space::Platform => Ok(m.platform().into()),
-            _ => Err(Error::Argument(format!(
-                "{} has no platform: its coordinates are its actuators",
-                self.name()
-            ))),
-        }
+        let other: Plant = match (&self.mechanism, space) {
+            (_, None) | (None, Some(Space::Actuators)) => return Ok(self),
+            (Some(m), Some(Space::Actuators)) => m.in_actuators()?.into(),
+            (Some(m), _) if m.platform().space() == Space::Platform => m.platform().into(),
+            _ => {
+                return Err(Error::Argument(format!(
+                    "{} has no platform: its coordinates are its actuators",
+                    self.name()
+                )));
+            }
+        };
+        Ok(Plant {
+            collisions: self.collisions,
+            ..other
+        })
     }
 
     /// The same robot with the limits filled in that a design needs and a tree does not state
     /// ([`Robot::with_assumed_limits`]). The workspace of a closed chain is always stated.
     pub fn with_assumed_limits(self) -> Self {
         match self.mechanism {
-            None => self.robot.with_assumed_limits().into(),
+            None => Plant {
+                collisions: self.collisions,
+                ..self.robot.with_assumed_limits().into()
+            },
             Some(_) => self,
         }
     }

@@ -4,6 +4,7 @@ pub(crate) mod joint;
 pub(crate) mod names;
 mod template;
 
+use super::geometry::{CollisionEntry, Entries, KeepInEntry, ShapeEntry};
 use super::urdf::{Options, Urdf};
 use super::{Prior, Robot, bundled};
 use crate::error::{Error, Result};
@@ -35,6 +36,14 @@ struct RobotFile {
     prior: Prior,
     #[serde(default)]
     joint: Vec<Spanned<JointEntry>>,
+    #[serde(default)]
+    collision: CollisionEntry,
+    #[serde(default)]
+    volume: Vec<ShapeEntry>,
+    #[serde(default)]
+    obstacle: Vec<ShapeEntry>,
+    #[serde(default)]
+    keep_in: Vec<KeepInEntry>,
 }
 
 /// A file name and its text, for messages and the hash.
@@ -396,6 +405,14 @@ fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
             joint_values(source, entry, &what, joint, warnings)?;
         }
     }
+    let surroundings = Entries {
+        collision: &file.collision,
+        volume: &file.volume,
+        obstacle: &file.obstacle,
+        keep_in: &file.keep_in,
+    };
+    let folder = source.file.parent().unwrap_or(Path::new(""));
+    surroundings.apply(source, folder, &mut robot.geometry)?;
     robot.hash = format!(
         "{:x}",
         Sha256::new()

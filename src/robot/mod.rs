@@ -9,6 +9,8 @@ mod assumed;
 #[doc(hidden)]
 pub mod bundled;
 pub(crate) mod file;
+#[doc(hidden)]
+pub mod geometry;
 pub(crate) mod inertia;
 pub(crate) mod meant;
 mod parameter;
@@ -249,6 +251,9 @@ pub struct Robot {
     pub path: Option<PathBuf>,
     /// SHA-256 (hexadecimal) of the files it was read from
     pub hash: String,
+    /// volumes of its links and what stands around it; not serialised
+    #[serde(skip)]
+    pub geometry: geometry::Geometry,
 }
 
 impl Robot {

@@ -10,16 +10,18 @@
 //!   one branch to its end before the next, branches in the order of the file;
 //! * the inertia of links that do not move is ignored.
 //!
-//! Meshes, transmissions, sensors and simulator extensions are skipped. What is imperfect but
+//! Geometry is kept for those who ask for volumes; transmissions, sensors and simulator extensions are skipped. What is imperfect but
 //! usable (no inertia, placeholder limits) becomes a [`Warning`]; what is contradictory is an
 //! error with file, line, link or joint, and what to do. Angles are kept as written; what `1.5708`
 //! and `-5.24e-08` mean is kept beside them, see [`meant`](super::meant).
 
 mod drive;
+mod geometry;
 mod limits;
 mod read;
 mod tree;
 
+use super::geometry::Form;
 use super::{Inertia, Placement, Robot};
 use crate::error::{Result, Warning};
 use nalgebra::{Matrix3, Vector3};
@@ -152,6 +154,8 @@ struct Link {
     line: usize,
     /// about the origin and in the axes of the link frame; `None` without `<inertial>`
     inertia: Option<Inertia>,
+    /// geometry in its frame
+    forms: Vec<Form>,
     /// to be reported if the link turns out to move
     warnings: Vec<Warning>,
 }

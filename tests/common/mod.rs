@@ -109,6 +109,7 @@ pub fn robot(seed: u64, n: usize, mimic: bool) -> Robot {
         warnings: vec![],
         path: None,
         hash: String::new(),
+        geometry: Default::default(),
     }
 }
 

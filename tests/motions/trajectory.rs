@@ -35,6 +35,7 @@ fn robot(bodies: Vec<Body>, joints: Vec<Joint>) -> Robot {
         warnings: Vec::new(),
         path: None,
         hash: String::new(),
+        geometry: Default::default(),
     }
 }
 

@@ -71,8 +71,7 @@ pub(super) fn curves(robot: &Robot, e: &Excitation) -> Section {
              that of the nominal model at " (significant(RATE, 4)) " Hz in the figure; its largest \
              value is sought on a finer grid and comes with a rigorous bound of what may happen \
              between the samples. Coulomb friction counts with the sign that makes the torque \
-             larger at all times. \
-             Collisions with the robot itself or its surroundings are not part of this proof."
+             larger at all times."
         } }
         (html::details("Certified extrema in numbers", numbers(robot, e)))
     };
@@ -91,22 +90,20 @@ fn between_samples(p: &Platform) -> &'static str {
              velocity, acceleration and jerk are those of the series itself, found as roots of its \
              derivative. Forces are those of the nominal model at 4000 instants; between two of \
              them they are bounded by twice the largest second difference, which is stated, not \
-             proven. Coulomb friction counts with the sign that makes the force larger. Collisions \
-             other than of legs are not looked at."
+             proven. Coulomb friction counts with the sign that makes the force larger."
         }
         (Space::Platform, true) => {
             "These are the actuators. Their positions, velocities, accelerations and jerks hold at \
              all times: they are enclosed over every stretch of time by interval arithmetic on the \
              kinematics. Forces are those of the nominal model at 4000 instants; between two of \
              them they are bounded by twice the largest second difference, which is stated, not \
-             proven. Coulomb friction counts with the sign that makes the force larger. Collisions \
-             other than of legs are not looked at."
+             proven. Coulomb friction counts with the sign that makes the force larger."
         }
         (_, false) => {
             "These are the actuators, at 4000 instants. Between two of them everything is bounded \
              by twice the largest second difference: this mechanism has no closed-form kinematics, \
              so that bound is stated, not proven. Coulomb friction counts with the sign that makes \
-             the force larger. Collisions other than of legs are not looked at."
+             the force larger."
         }
     }
 }

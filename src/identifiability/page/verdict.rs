@@ -1,6 +1,6 @@
 //! The verdict in a sentence, built from the facts.
 
-use super::{KNOWN, parameters};
+use super::{KNOWN, clearance, parameters};
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::mechanism::PoseKind;
 use crate::report::format::{count, percent, significant, unit_of, with_unit};
@@ -10,9 +10,39 @@ use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
 /// Condition number from which a trajectory does not excite every base parameter.
 const UNEXCITED: f64 = 1e7;
 
-/// What no verdict may leave out: the limits say nothing of collisions.
-const UNCHECKED: &str =
-    "Collisions of the robot with itself and with its surroundings were not checked.";
+/// What no verdict may leave out: what is known of collisions.
+fn collisions(e: &Excitation) -> String {
+    let Some(c) = &e.clearance else {
+        return "Collisions of the robot with itself and with its surroundings were not checked.".into();
+    };
+    let unseen = match c.certificate.unseen.as_slice() {
+        [] => String::new(),
+        all => format!(" The volume of {} is not known and was not looked at.", all.join(", ")),
+    };
+    format!("Collisions: {}.{unseen}", clearance::sentence(c))
+}
+
+/// The pair that comes too near, in words.
+fn too_near(e: &Excitation) -> Option<String> {
+    let c = &e.clearance.as_ref()?.certificate;
+    if c.satisfied {
+        return None;
+    }
+    let p = c.pairs.iter().find(|p| p.bound < p.margin)?;
+    let [a, b] = &p.between;
+    let time = with_unit(p.time, 3, "s");
+    Some(match p.least < 0.0 {
+        true => format!(
+            "{a} and {b} overlap by {} at {time}",
+            clearance::millimetres(-p.least)
+        ),
+        false => format!(
+            "{a} and {b} come as near as {} at {time} (margin {})",
+            clearance::millimetres(p.least),
+            clearance::millimetres(p.margin)
+        ),
+    })
+}
 
 /// The verdict in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -53,7 +83,9 @@ pub fn verdict(a: &Assessment) -> Verdict {
             ),
         };
     };
-    let broken = violations(&a.robot, e);
+    let mut broken = violations(&a.robot, e);
+    broken.splice(0..0, too_near(e));
+    let unchecked = collisions(e);
     if !e.certificate.satisfied || !broken.is_empty() {
         let more = match broken.len().saturating_sub(1) {
             0 => String::new(),
@@ -93,7 +125,7 @@ pub fn verdict(a: &Assessment) -> Verdict {
             grade: Grade::Unexciting,
             text: format!(
                 "Inside its limits, but not every parameter is excited: {limits}, yet the motion \
-                 cannot separate all {} (condition number {}). {UNCHECKED}",
+                 cannot separate all {} (condition number {}). {unchecked}",
                 count(b, "base parameter"),
                 significant(condition, 2)
             ),
@@ -118,13 +150,13 @@ pub fn verdict(a: &Assessment) -> Verdict {
     if 2 * known >= judged {
         Verdict {
             grade: Grade::Worthwhile,
-            text: format!("Inside its limits and worth running: {facts}. {UNCHECKED}"),
+            text: format!("Inside its limits and worth running: {facts}. {unchecked}"),
         }
     } else {
         Verdict {
             grade: Grade::Weak,
             text: format!(
-                "Inside its limits, but most parameters stay uncertain: {facts}. {UNCHECKED}"
+                "Inside its limits, but most parameters stay uncertain: {facts}. {unchecked}"
             ),
         }
     }

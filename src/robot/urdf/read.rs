@@ -1,5 +1,6 @@
 //! XML to links and joints.
 
+use super::geometry::forms;
 use super::{Kind, Limit, Link, Mimic, Urdf, UrdfJoint};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Inertia, Placement, meant};
@@ -24,7 +25,7 @@ const READ: [&str; 12] = [
 ];
 
 /// Name and text that errors refer to.
-struct Source<'a> {
+pub(super) struct Source<'a> {
     file: &'a Path,
     /// byte offsets at which lines begin
     lines: Vec<usize>,
@@ -43,7 +44,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    fn line(&self, node: Node) -> usize {
+    pub(super) fn line(&self, node: Node) -> usize {
         self.lines
             .partition_point(|&start| start <= node.range().start)
     }
@@ -338,6 +339,7 @@ fn link(source: &Source, node: Node, name: &str, what: &str) -> Result<Link> {
         name: name.to_string(),
         line: source.line(node),
         inertia,
+        forms: forms(source, node),
         warnings,
     })
 }

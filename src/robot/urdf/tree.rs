@@ -3,8 +3,10 @@
 use super::drive::{Drive, drives};
 use super::{Kind, MAX_MOVING_JOINTS, Options, StatedLimits, Urdf, UrdfJoint, limits};
 use crate::error::{Error, Result, Warning, WarningKind};
+use crate::robot::geometry::{Geometry, Link, Part, folders};
 use crate::robot::meant::angle;
 use crate::robot::{Body, Joint, Motion, Placement, Prior, Robot};
+use crate::solid;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use std::collections::HashMap;
 
@@ -98,7 +100,7 @@ pub(super) fn build(urdf: &Urdf, options: &Options) -> Result<Robot> {
         );
     }
 
-    let bodies = bodies(urdf, &order, &drives, &coordinate, &mut warnings)?;
+    let (bodies, geometry) = bodies(urdf, &order, &drives, &coordinate, &mut warnings)?;
     Ok(Robot {
         name: urdf.name.clone(),
         bodies,
@@ -108,6 +110,7 @@ pub(super) fn build(urdf: &Urdf, options: &Options) -> Result<Robot> {
         warnings,
         path: None,
         hash: String::new(),
+        geometry,
     })
 }
 
@@ -315,7 +318,7 @@ fn bodies(
     drives: &[Drive],
     coordinate: &[usize],
     warnings: &mut Vec<Warning>,
-) -> Result<Vec<Body>> {
+) -> Result<(Vec<Body>, Geometry)> {
     let mut poses: HashMap<&str, Pose> = HashMap::with_capacity(urdf.links.len());
     let mut bodies: Vec<Body> = Vec::new();
     let mut has_inertial = Vec::new();
@@ -410,5 +413,35 @@ fn bodies(
             ));
         }
     }
-    Ok(bodies)
+    Ok((bodies, geometry(urdf, &poses)))
+}
+
+/// Where every link sits, and its geometry.
+fn geometry(urdf: &Urdf, poses: &HashMap<&str, Pose>) -> Geometry {
+    let links = urdf.links.iter().map(|link| {
+        let at = poses.get(link.name.as_str()).copied().unwrap_or_default();
+        Link {
+            name: link.name.clone(),
+            body: at.body,
+            pose: solid::Pose {
+                rotation: at.written.rotation,
+                position: at.written.position,
+            },
+            parent: urdf
+                .joints
+                .iter()
+                .find(|j| j.child == link.name)
+                .map(|j| j.parent.clone()),
+        }
+    });
+    let parts = urdf.links.iter().enumerate().flat_map(|(link, l)| {
+        let forms = l.forms.iter().cloned();
+        forms.map(move |form| Part { link, form })
+    });
+    Geometry {
+        links: links.collect(),
+        parts: parts.collect(),
+        folders: folders(&urdf.file),
+        ..Geometry::default()
+    }
 }

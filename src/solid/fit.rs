@@ -1,4 +1,4 @@
-//! Capsules that enclose a mesh.
+//! Capsules and boxes that enclose a mesh.
 //!
 //! One capsule is convex, so it holds a triangle if it holds its corners. For a given direction `u` of the
 //! axis the least radius is that of the smallest circle about the points seen along `u`; with a radius
@@ -10,12 +10,13 @@
 //!
 //! so that the volume `π r² (b − a) + 4/3 π r³` is a function of `u` and `r`, least over a grid of
 //! directions and then by pattern search. Where one capsule is much larger than the convex hull the
-//! triangles are split across the longest axis of the part and each part gets its own.
+//! triangles are split across the axes of the part and each part gets its own. A part that a box encloses much
+//! more tightly than a capsule gets the box.
 
 use super::hull::hull;
 use super::mesh::Mesh;
-use super::shape::Shape;
-use nalgebra::{Matrix3, Vector3};
+use super::shape::{Pose, Shape};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::f64::consts::PI;
 
 type V = Vector3<f64>;
@@ -26,7 +27,7 @@ const DIRECTIONS: usize = 160;
 /// What a fit of one mesh came to.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// the capsules; a sphere is a capsule of length zero
+    /// capsules (a sphere is one of length zero) and boxes
     pub shapes: Vec<Shape>,
     /// volume of their union, m³
     pub volume: f64,
@@ -36,7 +37,7 @@ pub struct Fit {
     pub protrusion: f64,
 }
 
-/// Encloses a mesh by at most `most` capsules, until their volume is below `enough` times that of the hull.
+/// Encloses a mesh by at most `most` shapes, until their volume is below `enough` times that of the hull.
 pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
     let whole = hull(&mesh.points);
     let cut = subdivided(mesh);
@@ -50,13 +51,13 @@ pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
     while volume > enough * hull_volume && parts.len() < most.max(1) {
         // the part whose split saves most
         let mut choice: Option<(f64, usize, [Part; 2])> = None;
-        for (i, (triangles, capsule)) in parts.iter().enumerate() {
+        for (i, (triangles, shape)) in parts.iter().enumerate() {
             for split in splits(mesh, triangles) {
                 let halves = split.map(|t| {
                     let c = enclose(mesh, &t);
                     (t, c)
                 });
-                let saved = capsule.volume() - halves.iter().map(|h| h.1.volume()).sum::<f64>();
+                let saved = shape.volume() - halves.iter().map(|h| h.1.volume()).sum::<f64>();
                 if choice.as_ref().is_none_or(|c| saved > c.0) {
                     choice = Some((saved, i, halves));
                 }
@@ -84,8 +85,11 @@ pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
     }
 }
 
-/// Triangles and the capsule that holds them.
-type Part = (Vec<usize>, Capsule);
+/// Triangles and the shape that holds them.
+type Part = (Vec<usize>, Shape);
+
+/// A box stands for a part where its volume is less than this part of the capsule's.
+const BOX: f64 = 0.75;
 
 /// The same surface with no edge longer than an eighth of the mesh's size, so that it can be split anywhere;
 /// a mesh that is fine enough already, or very large, stays as it is.
@@ -118,7 +122,7 @@ fn subdivided(mesh: &Mesh) -> Mesh {
 }
 
 fn shapes(parts: &[Part]) -> Vec<Shape> {
-    parts.iter().map(|p| p.1.shape()).collect()
+    parts.iter().map(|p| p.1.clone()).collect()
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -155,15 +159,73 @@ fn corners(mesh: &Mesh, triangles: &[usize]) -> Vec<V> {
     }
 }
 
-/// The smallest capsule found about these triangles.
-fn enclose(mesh: &Mesh, triangles: &[usize]) -> Capsule {
+/// The smallest shape found about these triangles.
+fn enclose(mesh: &Mesh, triangles: &[usize]) -> Shape {
     let points = corners(mesh, triangles);
-    let mut tries: Vec<V> = principal_axes(&points).to_vec();
+    let capsule = capsule(&points);
+    let boxed = smallest_box(&points);
+    match boxed.volume() < BOX * capsule.volume() {
+        true => boxed,
+        false => capsule.shape(),
+    }
+}
+
+/// The smallest box found about points: turned about its axes by smaller and smaller angles.
+fn smallest_box(points: &[V]) -> Shape {
+    let about = |axes: &Matrix3<f64>| -> (f64, V, V) {
+        let (mut lo, mut hi) = (V::repeat(f64::INFINITY), V::repeat(f64::NEG_INFINITY));
+        for p in points {
+            let x = axes.tr_mul(p);
+            lo = lo.inf(&x);
+            hi = hi.sup(&x);
+        }
+        let size = hi - lo;
+        (size.x * size.y * size.z, lo, hi)
+    };
+    let [a, b, _] = principal_axes(points);
+    let principal = Matrix3::from_columns(&[a, b, a.cross(&b)]);
+    let best = [principal, Matrix3::identity()].into_iter().map(|start| {
+        let (mut axes, mut least) = (start, about(&start).0);
+        let mut step = 0.4;
+        while step > 1e-4 {
+            let turns = (0..6).map(|k| {
+                let mut by = V::zeros();
+                by[k / 2] = if k % 2 == 0 { step } else { -step };
+                let turned = axes * Rotation3::new(by).into_inner();
+                (about(&turned).0, turned)
+            });
+            match turns.min_by(|x, y| x.0.total_cmp(&y.0)) {
+                Some((volume, turned)) if volume < least * (1.0 - 1e-9) => {
+                    (least, axes) = (volume, turned);
+                }
+                _ => step *= 0.5,
+            }
+        }
+        (least, axes)
+    });
+    let axes = best
+        .min_by(|x, y| x.0.total_cmp(&y.0))
+        .map_or(Matrix3::identity(), |b| b.1);
+    let (_, lo, hi) = about(&axes);
+    // rounding must leave no corner outside
+    let half = (hi - lo) * 0.5 * (1.0 + 1e-9) + V::repeat(1e-12);
+    Shape::Box {
+        pose: Pose {
+            rotation: axes,
+            position: axes * ((lo + hi) * 0.5),
+        },
+        half,
+    }
+}
+
+/// The smallest capsule found about points.
+fn capsule(points: &[V]) -> Capsule {
+    let mut tries: Vec<V> = principal_axes(points).to_vec();
     tries.extend((0..DIRECTIONS).map(|k| half_sphere(k, DIRECTIONS)));
     let mut found: Vec<(f64, V, Capsule)> = tries
         .into_iter()
         .map(|u| {
-            let c = along(&points, &u);
+            let c = along(points, &u);
             (c.volume(), u, c)
         })
         .collect();
@@ -176,7 +238,7 @@ fn enclose(mesh: &Mesh, triangles: &[usize]) -> Capsule {
             let near = [e, -e, f, -f].map(|d| (u + d * step).normalize());
             let best = near
                 .into_iter()
-                .map(|v| (v, along(&points, &v)))
+                .map(|v| (v, along(points, &v)))
                 .min_by(|a, b| a.1.volume().total_cmp(&b.1.volume()));
             match best {
                 Some((v, k)) if k.volume() < volume * (1.0 - 1e-9) => {
@@ -381,7 +443,7 @@ pub fn union_volume(shapes: &[Shape]) -> f64 {
     let (mut lo, mut hi) = (V::repeat(f64::INFINITY), V::repeat(f64::NEG_INFINITY));
     for s in shapes {
         let mut v = [V::zeros(); 8];
-        let k = s.core(&super::shape::Pose::identity(), &mut v);
+        let k = s.core(&Pose::identity(), &mut v);
         for p in &v[..k] {
             lo = lo.inf(&(p - V::repeat(s.radius())));
             hi = hi.sup(&(p + V::repeat(s.radius())));
@@ -422,7 +484,7 @@ fn protrusion(shapes: &[Shape], mesh: &Mesh, hull: &super::hull::Hull) -> f64 {
     let mut most: f64 = 0.0;
     for s in shapes {
         let mut v = [V::zeros(); 8];
-        let k = s.core(&super::shape::Pose::identity(), &mut v);
+        let k = s.core(&Pose::identity(), &mut v);
         for end in &v[..k] {
             for d in 0..400 {
                 let u = half_sphere(d / 2, 200) * if d % 2 == 0 { 1.0 } else { -1.0 };

@@ -154,3 +154,24 @@ pub fn nearest_on_segment(
     };
     from + d * t
 }
+
+impl Shape {
+    /// The same volume in the frame `W` in which its own frame has this pose.
+    pub fn moved(&self, by: &Pose) -> Shape {
+        match self {
+            Shape::Sphere { centre, radius } => Shape::Sphere {
+                centre: by.apply(centre),
+                radius: *radius,
+            },
+            Shape::Capsule { from, to, radius } => Shape::Capsule {
+                from: by.apply(from),
+                to: by.apply(to),
+                radius: *radius,
+            },
+            Shape::Box { pose, half } => Shape::Box {
+                pose: by.then(pose),
+                half: *half,
+            },
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! The scene of a robot: its volumes, the floor, what its file puts around it, and the pairs that matter.
+//!
+//! A pair is two volumes of different links, or a volume that moves and an obstacle. Left out are links that a
+//! joint joins, pairs that the robot file or its SRDF names, and pairs that are nearer than the margin in every
+//! one of many random postures: no motion can keep them apart. Every other pair stays, however far apart.
+
+use super::scene::{LeftOut, Pair, Partner, Scene, Volume, poses};
+use super::srdf;
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::robot::Robot;
+use crate::robot::geometry::{Geometry, MARGIN, Obstacle};
+use crate::solid::{Pose, Shape};
+use nalgebra::Vector3;
+
+/// The base may reach this far below the plane `z = 0` and the plane be a floor all the same, m.
+const SUNK: f64 = 0.03;
+/// Free postures that are kept.
+const KEPT: usize = 400;
+
+/// Name of the plane `z = 0` of the base frame.
+pub const FLOOR: &str = "floor";
+
+/// The scene of a robot over these postures (positions of all joints); `None` where its files tell no volume,
+/// or where they say that collisions are not looked at.
+///
+/// # Errors
+/// An SRDF that cannot be read; no posture without contact: the pairs that are in the way.
+pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
+    let geometry = &robot.geometry;
+    if geometry.is_empty() || geometry.check == Some(false) {
+        return Ok(None);
+    }
+    let found = geometry.volumes();
+    let mut scene = Scene {
+        margin: geometry.margin.unwrap_or(MARGIN),
+        obstacles: geometry.obstacles.clone(),
+        unseen: found.unseen.iter().map(|l| geometry.links[*l].name.clone()).collect(),
+        warnings: found.warnings.clone(),
+        ..Scene::default()
+    };
+    for link in &found.links {
+        let at = &geometry.links[link.link];
+        scene.volumes.extend(link.shapes.iter().map(|shape| Volume {
+            link: at.name.clone(),
+            body: at.body,
+            shape: shape.clone(),
+        }));
+    }
+    if scene.volumes.is_empty() {
+        return Ok(None);
+    }
+    scene.bodies_unseen(robot);
+    scene.floor(geometry);
+    let joined = Joined::new(geometry);
+    let ignored = ignored(geometry, &mut scene.warnings)?;
+    scene.pair_up(&joined, &ignored);
+    scene.keep_in(robot);
+    scene.sample(robot, postures)?;
+    Ok(Some(scene))
+}
+
+/// Pairs that the robot file and its SRDF name.
+fn ignored(geometry: &Geometry, warnings: &mut Vec<Warning>) -> Result<Vec<[String; 2]>> {
+    let mut all = geometry.ignore.clone();
+    let Some(path) = &geometry.srdf else {
+        return Ok(all);
+    };
+    let disabled = srdf::disabled(path)?;
+    let (known, other): (Vec<_>, Vec<_>) = disabled
+        .into_iter()
+        .partition(|pair| pair.iter().all(|l| geometry.link(l).is_some()));
+    if let Some([a, b]) = other.first() {
+        let message = format!(
+            "{} of its {} pairs name links that this robot does not have (`{a}` and `{b}` first): \
+             is it the SRDF of another robot?",
+            other.len(),
+            other.len() + known.len()
+        );
+        if known.is_empty() {
+            return Err(Error::file(path, "", message));
+        }
+        let name = path.display().to_string();
+        warnings.push(Warning::new(WarningKind::EntryIgnored, name, message));
+    }
+    all.extend(known);
+    Ok(all)
+}
+
+/// Which links a joint joins, links without volume passed over.
+struct Joined(Vec<(String, String)>);
+
+impl Joined {
+    fn new(geometry: &Geometry) -> Self {
+        let with: Vec<usize> = geometry.volumes().links.iter().map(|v| v.link).collect();
+        let up = |name: &Option<String>| name.as_deref().and_then(|n| geometry.link(n));
+        let mut pairs = Vec::new();
+        for &link in &with {
+            let mut at = up(&geometry.links[link].parent);
+            while let Some(parent) = at {
+                if with.contains(&parent) {
+                    let name = |l: usize| geometry.links[l].name.clone();
+                    pairs.push((name(link), name(parent)));
+                    break;
+                }
+                at = up(&geometry.links[parent].parent);
+            }
+        }
+        Joined(pairs)
+    }
+
+    fn holds(&self, a: &str, b: &str) -> bool {
+        let same = |(x, y): &(String, String)| (x == a && y == b) || (x == b && y == a);
+        self.0.iter().any(same)
+    }
+}
+
+impl Scene {
+    /// Bodies with a mass that no volume stands for.
+    fn bodies_unseen(&mut self, robot: &Robot) {
+        for (i, body) in robot.bodies.iter().enumerate() {
+            let seen = self.volumes.iter().any(|v| v.body == Some(i));
+            if !seen && body.inertia.0[0] > 0.0 && !self.unseen.contains(&body.name) {
+                self.unseen.push(body.name.clone());
+            }
+        }
+        if let Some(first) = self.unseen.first() {
+            self.warnings.push(Warning::new(
+                WarningKind::CollisionNotChecked,
+                "collisions",
+                format!(
+                    "the volume of {} link{} is not known (`{first}` first): what touches there is not \
+                     seen; add [[volume]] to robot.toml",
+                    self.unseen.len(),
+                    if self.unseen.len() == 1 { "" } else { "s" }
+                ),
+            ));
+        }
+    }
+
+    /// The plane `z = 0` of the base frame, where the file asks for it, or where it says nothing and the base
+    /// stands on it.
+    fn floor(&mut self, geometry: &Geometry) {
+        let lowest = |v: &Volume| {
+            let mut corners = [Vector3::zeros(); 8];
+            let k = v.shape.core(&Pose::identity(), &mut corners);
+            let z = corners[..k].iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+            z - v.shape.radius()
+        };
+        let base = self.volumes.iter().filter(|v| v.body.is_none()).map(lowest);
+        let low = base.fold(f64::INFINITY, f64::min);
+        let wanted = geometry.floor.unwrap_or(low > -SUNK);
+        if geometry.floor.is_none() && !wanted {
+            self.warnings.push(Warning::new(
+                WarningKind::CollisionNotChecked,
+                "floor",
+                format!(
+                    "the base reaches {:.2} m below its own frame, so no floor is assumed at z = 0; \
+                     state `floor = true` in [collision], or the floor as an [[obstacle]]",
+                    -low
+                ),
+            ));
+        }
+        if wanted {
+            self.obstacles.push(Obstacle::Plane {
+                name: FLOOR.into(),
+                normal: Vector3::z(),
+                offset: 0.0,
+            });
+        }
+    }
+
+    /// All pairs but those that are joined or named.
+    fn pair_up(&mut self, joined: &Joined, ignored: &[[String; 2]]) {
+        let margin = self.margin;
+        let named = |a: &str, b: &str| {
+            ignored
+                .iter()
+                .any(|[x, y]| (x == a && y == b) || (x == b && y == a))
+        };
+        let mut out = LeftOuts::default();
+        for (i, a) in self.volumes.iter().enumerate() {
+            for (k, b) in self.volumes.iter().enumerate().skip(i + 1) {
+                if a.body == b.body || a.link == b.link {
+                    continue;
+                }
+                if joined.holds(&a.link, &b.link) {
+                    out.add(&a.link, &b.link, "joined by a joint");
+                } else if named(&a.link, &b.link) {
+                    out.add(&a.link, &b.link, "named by the robot file");
+                } else {
+                    // the first one moves
+                    let (volume, other) = if a.body.is_some() { (i, k) } else { (k, i) };
+                    let partner = Partner::Volume(other);
+                    self.pairs.push(Pair {
+                        volume,
+                        partner,
+                        margin,
+                    });
+                }
+            }
+            if a.body.is_none() {
+                continue;
+            }
+            for (o, obstacle) in self.obstacles.iter().enumerate() {
+                match named(&a.link, obstacle.name()) {
+                    true => out.add(&a.link, obstacle.name(), "named by the robot file"),
+                    false => self.pairs.push(Pair {
+                        volume: i,
+                        partner: Partner::Obstacle(o),
+                        margin,
+                    }),
+                }
+            }
+        }
+        self.left_out = out.0;
+    }
+
+    /// Boxes in which frames must stay: a point at the frame, and a plane for each face.
+    fn keep_in(&mut self, robot: &Robot) {
+        let geometry = &robot.geometry;
+        for keep in &geometry.keep_in {
+            let Some(link) = geometry.link(&keep.frame).map(|l| &geometry.links[l]) else {
+                continue;
+            };
+            let volume = self.volumes.len();
+            self.volumes.push(Volume {
+                link: format!("origin of {}", keep.frame),
+                body: link.body,
+                shape: Shape::Sphere {
+                    centre: link.pose.position,
+                    radius: 0.0,
+                },
+            });
+            for axis in 0..3 {
+                for (bound, sign, side) in [(keep.low[axis], 1.0, "low"), (keep.high[axis], -1.0, "high")] {
+                    if !bound.is_finite() {
+                        continue;
+                    }
+                    let mut normal = Vector3::zeros();
+                    normal[axis] = sign;
+                    let name = format!("keep_in {side} {}", ["x", "y", "z"][axis]);
+                    self.obstacles.push(Obstacle::Plane {
+                        name,
+                        normal,
+                        offset: sign * bound,
+                    });
+                    self.pairs.push(Pair {
+                        volume,
+                        partner: Partner::Obstacle(self.obstacles.len() - 1),
+                        margin: 0.0,
+                    });
+                }
+            }
+        }
+    }
+
+    /// Looks at the pairs in many postures: leaves out those that no posture keeps apart, and keeps postures
+    /// without contact.
+    fn sample(&mut self, robot: &Robot, postures: &[Vec<f64>]) -> Result<()> {
+        if postures.is_empty() {
+            return Ok(());
+        }
+        let mut at = Vec::new();
+        let rooms: Vec<Vec<f64>> = postures
+            .iter()
+            .map(|q| {
+                poses(robot, q, &mut at);
+                let room = |p: &Pair| self.separation(p, &at).distance - p.margin;
+                self.pairs.iter().map(room).collect()
+            })
+            .collect();
+        let never: Vec<bool> = (0..self.pairs.len())
+            .map(|p| rooms.iter().all(|r| r[p] < 0.0))
+            .collect();
+        let mut out = LeftOuts(std::mem::take(&mut self.left_out));
+        for (pair, _) in self.pairs.iter().zip(&never).filter(|(_, n)| **n) {
+            let [a, b] = self.names(pair);
+            out.add(a, b, "nearer than the margin in every posture");
+        }
+        self.left_out = out.0;
+        let mut free: Vec<(f64, usize)> = rooms
+            .iter()
+            .enumerate()
+            .map(|(i, r)| {
+                let kept = r.iter().zip(&never).filter(|(_, n)| !**n);
+                (kept.map(|(d, _)| *d).fold(f64::INFINITY, f64::min), i)
+            })
+            .filter(|(room, _)| *room >= 0.0)
+            .collect();
+        if free.is_empty() {
+            return Err(self.no_room(robot, &rooms, &never));
+        }
+        free.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.free = free.iter().take(KEPT).map(|(_, i)| postures[*i].clone()).collect();
+        let mut never = never.into_iter();
+        self.pairs.retain(|_| !never.next().unwrap_or(false));
+        Ok(())
+    }
+
+    /// Which pairs leave no free posture: those in contact most often.
+    fn no_room(&self, robot: &Robot, rooms: &[Vec<f64>], never: &[bool]) -> Error {
+        let mut often: Vec<(usize, usize)> = (0..self.pairs.len())
+            .filter(|p| !never[*p])
+            .map(|p| (rooms.iter().filter(|r| r[p] < 0.0).count(), p))
+            .collect();
+        often.sort_by(|a, b| b.cmp(a));
+        let mut named: Vec<String> = Vec::new();
+        for (count, p) in often {
+            let [a, b] = self.names(&self.pairs[p]);
+            let share = 100.0 * count as f64 / rooms.len() as f64;
+            let text = format!("{a} and {b} ({share:.0} %)");
+            if named.len() < 3 && !named.iter().any(|n| n.starts_with(&format!("{a} and {b} "))) {
+                named.push(text);
+            }
+        }
+        Error::Infeasible(format!(
+            "{}: none of {} random postures is free of contact at a margin of {} m; most often in contact: \
+             {}. Check [[obstacle]], `floor` and `margin`, name pairs that may touch in `ignore`, or look at \
+             no collision (--no-collision)",
+            robot.name,
+            rooms.len(),
+            self.margin,
+            named.join(", ")
+        ))
+    }
+}
+
+/// Pairs of names that are left out, each once.
+#[derive(Default)]
+struct LeftOuts(Vec<LeftOut>);
+
+impl LeftOuts {
+    fn add(&mut self, a: &str, b: &str, why: &str) {
+        let known = |l: &LeftOut| l.between[0] == a && l.between[1] == b;
+        if !self.0.iter().any(known) {
+            self.0.push(LeftOut {
+                between: [a.into(), b.into()],
+                why: why.into(),
+            });
+        }
+    }
+}

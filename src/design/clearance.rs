@@ -1,0 +1,248 @@
+//! Clearances of a tree at samples of a period, and their linearisation.
+//!
+//! A pair of volumes with margin `m` keeps `d(q(t)) ≥ m`. Around a motion `x̄` the row of a pair at an instant is
+//!
+//! ```text
+//! d̄ + Σ_j (∂d/∂q_j) B_j(t) δ_j ≥ m + ε            ∂d/∂q_j = nᵀ (∂b/∂q_j − ∂a/∂q_j)
+//! ```
+//!
+//! with the exact gradient at the nearest points, and `ε` for what happens between the samples; the certificate
+//! that ends a design proves the rest. Samples at which a pair cannot be near, because it was far from it a
+//! moment ago, are passed over.
+
+use super::information::{Evaluation, Information};
+use super::path::{PathLimits, PathMemory, PathRow};
+use crate::collision::Scene;
+use crate::collision::clearance::reaches;
+use crate::collision::scene::poses;
+use crate::dynamics::Samples;
+use crate::robot::Robot;
+use crate::solid::{Pose, Separation};
+use crate::trajectory::{Basis, Table};
+use std::sync::Arc;
+
+/// Samples a period for each harmonic.
+const SAMPLES: usize = 80;
+/// Room kept for what happens between the samples, m.
+const BETWEEN: f64 = 2e-3;
+/// Pairs nearer than this beyond their margin get rows, m.
+const NEAR: f64 = 0.12;
+/// … and a row at every sample where they are nearer than this, m.
+const TIGHT: f64 = 0.012;
+/// A use of `1 + 1` stands for this much too near, m.
+const UNIT: f64 = 0.05;
+
+/// Clearances of a tree.
+pub(super) struct ClearanceLimits<'a> {
+    scene: Arc<Scene>,
+    robot: &'a Robot,
+    /// `N × m`: positions at the samples from the free numbers of a joint, sample by sample
+    rows: Vec<f64>,
+    free: usize,
+    count: usize,
+    rest: Vec<f64>,
+    /// largest change of the distance of each pair between two samples, m
+    change: Vec<f64>,
+    /// least distance of each pair, m
+    need: Vec<f64>,
+}
+
+/// A pair at an instant.
+struct Instant {
+    pair: usize,
+    sample: usize,
+    separation: Separation,
+}
+
+impl<'a> ClearanceLimits<'a> {
+    /// Of a robot with finite limits; `tighter` below 1 asks for more room.
+    pub fn new(
+        scene: Arc<Scene>,
+        robot: &'a Robot,
+        basis: &Basis,
+        period: f64,
+        tighter: f64,
+    ) -> Self {
+        let most = basis.harmonics.iter().copied().max().unwrap_or(1) as usize;
+        let count = (SAMPLES * most).clamp(200, 4000);
+        let table = Table::new(period, &basis.harmonics, count);
+        let design = table.design(0) * &basis.map;
+        let free = basis.free();
+        let rows = (0..count)
+            .flat_map(|i| (0..free).map(move |k| (i, k)))
+            .map(|at| design[at])
+            .collect();
+        let largest: Vec<f64> = (robot.joints.iter())
+            .map(|j| j.limits.position[0].abs().max(j.limits.position[1].abs()))
+            .collect();
+        let step = period / count as f64;
+        let change = scene.pairs.iter().map(|pair| {
+            let rho = reaches(robot, &scene, pair, &largest);
+            let joints = robot.joints.iter().zip(rho);
+            let moving = joints.filter(|(_, r)| *r > 0.0);
+            step * moving.map(|(j, r)| j.limits.velocity * r).sum::<f64>()
+        });
+        let change = change.collect();
+        let extra = BETWEEN + 0.05 * (1.0 - tighter);
+        let need = scene.pairs.iter().map(|p| p.margin + extra).collect();
+        ClearanceLimits {
+            robot,
+            rows,
+            free,
+            count,
+            rest: basis.offset.iter().map(|o| o[0]).collect(),
+            change,
+            need,
+            scene,
+        }
+    }
+
+    fn row(&self, sample: usize) -> &[f64] {
+        &self.rows[sample * self.free..(sample + 1) * self.free]
+    }
+
+    /// Poses of all bodies at all samples.
+    fn along(&self, x: &[f64]) -> Vec<Vec<Pose>> {
+        let mut q = vec![0.0; self.rest.len()];
+        (0..self.count)
+            .map(|i| {
+                let row = self.row(i);
+                for (j, q) in q.iter_mut().enumerate() {
+                    let own = &x[j * self.free..(j + 1) * self.free];
+                    *q = self.rest[j] + row.iter().zip(own).map(|(r, x)| r * x).sum::<f64>();
+                }
+                let mut at = Vec::with_capacity(self.robot.bodies.len());
+                poses(self.robot, &q, &mut at);
+                at
+            })
+            .collect()
+    }
+
+    /// Least room over all pairs and samples; ends at the first that is below `enough`.
+    fn least(&self, along: &[Vec<Pose>], enough: f64) -> (f64, usize, usize) {
+        let mut least = (f64::INFINITY, 0, 0);
+        for (p, pair) in self.scene.pairs.iter().enumerate() {
+            let mut i = 0;
+            while i < self.count {
+                let room = self.scene.separation(pair, &along[i]).distance - self.need[p];
+                if room < least.0 {
+                    least = (room, p, i);
+                    if room < enough {
+                        return least;
+                    }
+                }
+                i += self.skip(p, room - least.0.min(0.0));
+            }
+        }
+        least
+    }
+
+    /// Samples after which the room of a pair can be gone.
+    fn skip(&self, pair: usize, room: f64) -> usize {
+        let change = self.change[pair];
+        match room > 0.0 && change > 0.0 {
+            true => ((room / change) as usize).clamp(1, self.count),
+            false if change == 0.0 => self.count,
+            false => 1,
+        }
+    }
+
+    /// Pairs at the instants where they are near: local minima, and every instant where they are very near.
+    fn near(&self, along: &[Vec<Pose>], from: f64, tight: f64) -> Vec<Instant> {
+        let mut out = Vec::new();
+        let mut rooms = vec![f64::INFINITY; self.count];
+        for (p, pair) in self.scene.pairs.iter().enumerate() {
+            rooms.fill(f64::INFINITY);
+            let mut i = 0;
+            while i < self.count {
+                rooms[i] = self.scene.separation(pair, &along[i]).distance - self.need[p];
+                i += self.skip(p, rooms[i] - from);
+            }
+            for i in 0..self.count {
+                let before = rooms[(i + self.count - 1) % self.count];
+                let after = rooms[(i + 1) % self.count];
+                let here = rooms[i];
+                if here < from && (here < tight || here <= before && here < after) {
+                    out.push(Instant {
+                        pair: p,
+                        sample: i,
+                        separation: self.scene.separation(pair, &along[i]),
+                    });
+                }
+            }
+        }
+        out
+    }
+
+    /// `∂d/∂x` of an instant.
+    fn gradient(&self, at: &Instant, poses: &[Pose]) -> Vec<f64> {
+        let mut by_joint = vec![0.0; self.rest.len()];
+        let pair = &self.scene.pairs[at.pair];
+        self.scene
+            .gradient(self.robot, pair, &at.separation, poses, &mut by_joint);
+        let row = self.row(at.sample);
+        by_joint
+            .iter()
+            .flat_map(|g| row.iter().map(move |r| g * r))
+            .collect()
+    }
+}
+
+impl PathLimits for ClearanceLimits<'_> {
+    fn used(&self, _: &Information, x: &[f64], _: &Samples, _: &mut PathMemory) -> f64 {
+        1.0 - self.least(&self.along(x), 0.0).0 / UNIT
+    }
+
+    fn rows(&self, _: &Information, x: &[f64], _: &mut Evaluation, _: f64) -> Vec<PathRow> {
+        let along = self.along(x);
+        let near = self.near(&along, NEAR, TIGHT);
+        near.iter()
+            .map(|at| PathRow {
+                gradient: self
+                    .gradient(at, &along[at.sample])
+                    .iter()
+                    .map(|g| -g)
+                    .collect(),
+                slack: at.separation.distance - self.need[at.pair],
+            })
+            .collect()
+    }
+
+    fn cuts(&self, _: &Information, x: &[f64], next: &[f64]) -> Vec<PathRow> {
+        let along = self.along(next);
+        let broken = self.near(&along, 0.0, 0.0);
+        broken
+            .iter()
+            .map(|at| {
+                // around the step that is refused: d̄ + g·(x + δ − x̄) ≥ need
+                let g = self.gradient(at, &along[at.sample]);
+                let moved: f64 = (g.iter().zip(x).zip(next))
+                    .map(|((g, x), n)| g * (x - n))
+                    .sum();
+                PathRow {
+                    slack: at.separation.distance - self.need[at.pair] + moved,
+                    gradient: g.iter().map(|g| -g).collect(),
+                }
+            })
+            .collect()
+    }
+
+    fn broken(&self, _: &Information, x: &[f64], _: &Samples) -> String {
+        let (room, pair, _) = self.least(&self.along(x), f64::NEG_INFINITY);
+        let pair = &self.scene.pairs[pair.min(self.scene.pairs.len() - 1)];
+        match room < 0.0 {
+            true => {
+                let [a, b] = self.scene.names(pair);
+                format!(
+                    "{a} and {b} are {:.3} m closer than the margin of {} m allows",
+                    -room, pair.margin
+                )
+            }
+            false => String::new(),
+        }
+    }
+
+    fn postures(&self) -> &[Vec<f64>] {
+        &self.scene.free
+    }
+}

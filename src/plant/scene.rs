@@ -1,0 +1,234 @@
+//! What a plant must not touch, and proof that a motion does not.
+
+use super::Plant;
+use crate::collision::clearance::{Fineness, Path, clearances};
+use crate::collision::scene::poses;
+use crate::collision::{Scene, build};
+use crate::error::Result;
+use crate::trajectory::Fourier;
+use crate::trajectory::certificate::Proof;
+use crate::trajectory::extrema::extrema;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Random postures in which pairs are looked at.
+const POSTURES: usize = 2000;
+const SEED: u64 = 0x5ce_0e;
+/// A clearance counts as kept when it is short by no more than this, m.
+const TOLERANCE: f64 = 1e-9;
+
+/// Least distance of two things along a motion.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct PairClearance {
+    /// names of the two
+    pub between: [String; 2],
+    /// least distance that was met, m
+    pub least: f64,
+    /// when, s into the period
+    pub time: f64,
+    /// at no time is it less than this, m
+    pub bound: f64,
+    /// least distance that is allowed, m
+    pub margin: f64,
+}
+
+/// What is known of collisions along a motion.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct ClearanceCertificate {
+    /// every pair of links or of a link and an obstacle, the one with the least room first
+    pub pairs: Vec<PairClearance>,
+    /// how the bounds are known
+    pub proof: Proof,
+    /// links whose volume is not known: what touches there is not seen
+    pub unseen: Vec<String>,
+    /// whether every pair keeps its margin at all times
+    pub satisfied: bool,
+}
+
+impl Plant {
+    /// The same robot with no look at collisions.
+    pub fn without_collisions(self) -> Self {
+        Plant {
+            collisions: false,
+            ..self
+        }
+    }
+
+    /// The same robot, its meshes looked for in these folders first.
+    pub fn with_meshes(mut self, folders: &[PathBuf]) -> Self {
+        if !folders.is_empty() {
+            self.robot.geometry.look_in(folders);
+            self.scene = Arc::default();
+        }
+        self
+    }
+
+    /// Volumes, obstacles and pairs that must stay apart; `None` where the robot's files tell no volume, or
+    /// collisions are not to be looked at. Meshes are opened at the first call.
+    ///
+    /// # Errors
+    /// As [`build::scene`].
+    pub fn scene(&self) -> Result<Option<Arc<Scene>>> {
+        if !self.collisions {
+            return Ok(None);
+        }
+        if let Some(known) = self.scene.get() {
+            return Ok(known.clone());
+        }
+        let states = self.random_states(POSTURES, SEED);
+        let postures: Vec<Vec<f64>> = (0..states.count)
+            .filter_map(|i| {
+                let x: Vec<f64> = (0..states.dof).map(|k| states.q[k * states.count + i]).collect();
+                self.posture(&x).ok()
+            })
+            .collect();
+        let found = build::scene(self.robot(), &postures)?.map(Arc::new);
+        Ok(self.scene.get_or_init(|| found).clone())
+    }
+
+    /// Positions of all joints, passive ones included, from coordinates.
+    ///
+    /// # Errors
+    /// A pose that cannot be reached.
+    pub fn posture(&self, x: &[f64]) -> Result<Vec<f64>> {
+        match self.mechanism() {
+            None => Ok(x.to_vec()),
+            Some(mechanism) => mechanism.inverse(x),
+        }
+    }
+
+    /// Least clearances of a motion: for all time of a tree, with the bound stated of a closed chain. `None`
+    /// where there is no [`Plant::scene`].
+    ///
+    /// # Errors
+    /// As [`Plant::scene`]; a pose that cannot be reached.
+    pub fn clearance(&self, fourier: &Fourier) -> Result<Option<ClearanceCertificate>> {
+        let Some(scene) = self.scene()? else {
+            return Ok(None);
+        };
+        let (pairs, proof) = match self.mechanism() {
+            None => (self.proven(&scene, fourier), Proof::Enclosed),
+            Some(_) => (self.stated(&scene, fourier)?, Proof::Stated),
+        };
+        let kept = |p: &PairClearance| p.bound >= p.margin - TOLERANCE;
+        Ok(Some(ClearanceCertificate {
+            satisfied: pairs.iter().all(kept),
+            pairs,
+            proof,
+            unseen: scene.unseen.clone(),
+        }))
+    }
+
+    fn proven(&self, scene: &Scene, fourier: &Fourier) -> Vec<PairClearance> {
+        let path = SeriesPath::new(fourier);
+        let found = clearances(self.robot(), scene, &path, Fineness::default());
+        let all = found.into_iter().map(|c| {
+            let pair = &scene.pairs[c.pair];
+            (named(scene, c.pair, [c.met, c.time, c.bound]), pair.margin)
+        });
+        by_names(all.map(|(p, _)| p))
+    }
+
+    /// Samples, and twice the largest second difference between them.
+    fn stated(&self, scene: &Scene, fourier: &Fourier) -> Result<Vec<PairClearance>> {
+        const SAMPLES: usize = 2000;
+        let motion = fourier.motion(SAMPLES);
+        let mut along = vec![Vec::with_capacity(SAMPLES); scene.pairs.len()];
+        let mut at = Vec::new();
+        for i in 0..SAMPLES {
+            let x: Vec<f64> = (0..motion.dof).map(|k| motion.q[k * SAMPLES + i]).collect();
+            poses(self.robot(), &self.posture(&x)?, &mut at);
+            for (pair, list) in scene.pairs.iter().zip(&mut along) {
+                list.push(scene.separation(pair, &at).distance);
+            }
+        }
+        let step = fourier.period / SAMPLES as f64;
+        Ok(by_names(along.iter().enumerate().map(|(p, d)| {
+            let least = (0..SAMPLES).min_by(|a, b| d[*a].total_cmp(&d[*b])).unwrap_or(0);
+            let second = |i: usize| d[(i + 1) % SAMPLES] - 2.0 * d[i] + d[(i + SAMPLES - 1) % SAMPLES];
+            let bend = (0..SAMPLES).map(|i| second(i).abs()).fold(0.0, f64::max);
+            named(scene, p, [d[least], least as f64 * step, d[least] - 0.25 * bend])
+        })))
+    }
+}
+
+fn named(scene: &Scene, pair: usize, [least, time, bound]: [f64; 3]) -> PairClearance {
+    let pair = &scene.pairs[pair];
+    PairClearance {
+        between: scene.names(pair).map(String::from),
+        least,
+        time,
+        bound,
+        margin: pair.margin,
+    }
+}
+
+/// One entry for two names that have several volumes each, the least room first.
+fn by_names(all: impl Iterator<Item = PairClearance>) -> Vec<PairClearance> {
+    let mut out: Vec<PairClearance> = Vec::new();
+    for p in all {
+        match out.iter_mut().find(|o| o.between == p.between) {
+            Some(old) => {
+                let bound = old.bound.min(p.bound);
+                if p.least < old.least {
+                    *old = p;
+                }
+                old.bound = bound;
+            }
+            None => out.push(p),
+        }
+    }
+    out.sort_by(|a, b| (a.least - a.margin).total_cmp(&(b.least - b.margin)));
+    out
+}
+
+/// A Fourier series as a path: speeds are bounded by the speed in the middle of a stretch and the largest
+/// acceleration.
+pub struct SeriesPath<'a> {
+    fourier: &'a Fourier,
+    acceleration: Vec<f64>,
+    speed: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+impl<'a> SeriesPath<'a> {
+    /// Of a motion.
+    pub fn new(fourier: &'a Fourier) -> Self {
+        let bound = |order: u32| -> Vec<f64> {
+            let joints = fourier.joints.iter();
+            joints
+                .map(|s| extrema(fourier.period, &fourier.harmonics, s, order).magnitude_bound())
+                .collect()
+        };
+        SeriesPath {
+            fourier,
+            acceleration: bound(2),
+            speed: bound(1),
+            largest: bound(0),
+        }
+    }
+}
+
+impl Path for SeriesPath<'_> {
+    fn position(&self, t: f64, q: &mut [f64]) {
+        self.fourier.evaluate(t, [q]);
+    }
+
+    fn speed(&self, from: f64, to: f64, v: &mut [f64]) {
+        let half = 0.5 * (to - from);
+        self.fourier.derivative(1, from + half, v);
+        for ((v, a), most) in v.iter_mut().zip(&self.acceleration).zip(&self.speed) {
+            *v = (v.abs() + a * half).min(*most);
+        }
+    }
+
+    fn largest(&self, joint: usize) -> f64 {
+        self.largest[joint]
+    }
+
+    fn duration(&self) -> f64 {
+        self.fourier.period
+    }
+}

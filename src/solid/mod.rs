@@ -1,0 +1,18 @@
+//! Convex volumes, the distance between them, and volumes that enclose a mesh.
+//!
+//! | file | content |
+//! |---|---|
+//! | [`shape`] | sphere, capsule, box: a convex core swept by a radius |
+//! | [`distance`] | signed distance of two shapes, witness points and normal |
+//! | [`mesh`] | triangles from STL, OBJ and COLLADA files |
+//! | [`hull`] | convex hull of points, its volume |
+//! | [`fit`] | capsules and boxes that enclose a mesh |
+
+pub mod distance;
+pub mod fit;
+pub mod hull;
+pub mod mesh;
+pub mod shape;
+
+pub use distance::{Separation, separation};
+pub use shape::{Pose, Shape};
