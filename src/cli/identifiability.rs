@@ -43,7 +43,9 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let mut plant = args.collisions.apply(load(&args.robot, args.identify.as_deref())?);
+    let mut plant = args
+        .collisions
+        .apply(load(&args.robot, args.identify.as_deref())?);
     let trajectory = args.trajectory.as_ref().map(Trajectory::read).transpose()?;
     if let (Some(t), Some(path)) = (&trajectory, &args.trajectory) {
         plant = plant

@@ -4,16 +4,19 @@
 //! joint joins, pairs that the robot file or its SRDF names, and pairs that are nearer than the margin in every
 //! one of many random postures: no motion can keep them apart. Every other pair stays, however far apart.
 
-use super::scene::{LeftOut, Pair, Partner, Scene, Volume, poses};
+use super::scene::{Balls, LeftOut, Pair, Partner, Scene, Volume, poses};
 use super::srdf;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Robot;
 use crate::robot::geometry::{Geometry, MARGIN, Obstacle};
 use crate::solid::{Pose, Shape};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// The base may reach this far below the plane `z = 0` and the plane be a floor all the same, m.
 const SUNK: f64 = 0.03;
+/// Room beyond which a posture is spacious, however much more there is, m.
+const FAR: f64 = 0.05;
 /// Free postures that are kept.
 const KEPT: usize = 400;
 
@@ -34,7 +37,11 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
     let mut scene = Scene {
         margin: geometry.margin.unwrap_or(MARGIN),
         obstacles: geometry.obstacles.clone(),
-        unseen: found.unseen.iter().map(|l| geometry.links[*l].name.clone()).collect(),
+        unseen: found
+            .unseen
+            .iter()
+            .map(|l| geometry.links[*l].name.clone())
+            .collect(),
         warnings: found.warnings.clone(),
         ..Scene::default()
     };
@@ -53,7 +60,7 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
     scene.floor(geometry);
     let joined = Joined::new(geometry);
     let ignored = ignored(geometry, &mut scene.warnings)?;
-    scene.pair_up(&joined, &ignored);
+    scene.pair_up(robot, &joined, &ignored);
     scene.keep_in(robot);
     scene.sample(robot, postures)?;
     Ok(Some(scene))
@@ -143,7 +150,10 @@ impl Scene {
         let lowest = |v: &Volume| {
             let mut corners = [Vector3::zeros(); 8];
             let k = v.shape.core(&Pose::identity(), &mut corners);
-            let z = corners[..k].iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+            let z = corners[..k]
+                .iter()
+                .map(|p| p.z)
+                .fold(f64::INFINITY, f64::min);
             z - v.shape.radius()
         };
         let base = self.volumes.iter().filter(|v| v.body.is_none()).map(lowest);
@@ -170,8 +180,16 @@ impl Scene {
     }
 
     /// All pairs but those that are joined or named.
-    fn pair_up(&mut self, joined: &Joined, ignored: &[[String; 2]]) {
+    fn pair_up(&mut self, robot: &Robot, joined: &Joined, ignored: &[[String; 2]]) {
         let margin = self.margin;
+        // the fingers of a gripper: they hang on one body and meet where its joint says
+        let together = |a: Option<usize>, b: Option<usize>| match (a, b) {
+            (Some(a), Some(b)) => {
+                let (a, b) = (&robot.bodies[a], &robot.bodies[b]);
+                a.coordinate == b.coordinate && a.parent == b.parent
+            }
+            _ => false,
+        };
         let named = |a: &str, b: &str| {
             ignored
                 .iter()
@@ -185,6 +203,8 @@ impl Scene {
                 }
                 if joined.holds(&a.link, &b.link) {
                     out.add(&a.link, &b.link, "joined by a joint");
+                } else if together(a.body, b.body) {
+                    out.add(&a.link, &b.link, "both follow one joint");
                 } else if named(&a.link, &b.link) {
                     out.add(&a.link, &b.link, "named by the robot file");
                 } else {
@@ -232,7 +252,10 @@ impl Scene {
                 },
             });
             for axis in 0..3 {
-                for (bound, sign, side) in [(keep.low[axis], 1.0, "low"), (keep.high[axis], -1.0, "high")] {
+                for (bound, sign, side) in [
+                    (keep.low[axis], 1.0, "low"),
+                    (keep.high[axis], -1.0, "high"),
+                ] {
                     if !bound.is_finite() {
                         continue;
                     }
@@ -260,12 +283,16 @@ impl Scene {
         if postures.is_empty() {
             return Ok(());
         }
-        let mut at = Vec::new();
+        let balls = Balls::new(self);
         let rooms: Vec<Vec<f64>> = postures
-            .iter()
+            .par_iter()
             .map(|q| {
+                let mut at = Vec::new();
                 poses(robot, q, &mut at);
-                let room = |p: &Pair| self.separation(p, &at).distance - p.margin;
+                let room = |p: &Pair| match balls.lower_bound(p, &at) - p.margin {
+                    far if far > FAR => far,
+                    _ => self.separation(p, &at).distance - p.margin,
+                };
                 self.pairs.iter().map(room).collect()
             })
             .collect();
@@ -291,7 +318,11 @@ impl Scene {
             return Err(self.no_room(robot, &rooms, &never));
         }
         free.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        self.free = free.iter().take(KEPT).map(|(_, i)| postures[*i].clone()).collect();
+        self.free = free
+            .iter()
+            .take(KEPT)
+            .map(|(_, i)| postures[*i].clone())
+            .collect();
         let mut never = never.into_iter();
         self.pairs.retain(|_| !never.next().unwrap_or(false));
         Ok(())
@@ -309,7 +340,11 @@ impl Scene {
             let [a, b] = self.names(&self.pairs[p]);
             let share = 100.0 * count as f64 / rooms.len() as f64;
             let text = format!("{a} and {b} ({share:.0} %)");
-            if named.len() < 3 && !named.iter().any(|n| n.starts_with(&format!("{a} and {b} "))) {
+            if named.len() < 3
+                && !named
+                    .iter()
+                    .any(|n| n.starts_with(&format!("{a} and {b} ")))
+            {
                 named.push(text);
             }
         }

@@ -155,7 +155,11 @@ pub fn clearances(robot: &Robot, scene: &Scene, path: &dyn Path, fine: Fineness)
         })
         .collect();
     let room = |c: &Clearance| c.met - scene.pairs[c.pair].margin;
-    out.sort_by(|a, b| room(&a.0).total_cmp(&room(&b.0)).then(a.0.pair.cmp(&b.0.pair)));
+    out.sort_by(|a, b| {
+        room(&a.0)
+            .total_cmp(&room(&b.0))
+            .then(a.0.pair.cmp(&b.0.pair))
+    });
     let mut nearest = f64::INFINITY;
     for (found, distances, rho) in &mut out {
         let pair = scene.pairs[found.pair];

@@ -3,11 +3,11 @@
 //! A pair is a volume of one body and a volume of another body, of the base, or an obstacle. Bodies that a
 //! joint joins and pairs that the user names are left out.
 
-use crate::solid::distance::{Separation, separation, separation_from_plane};
-use crate::solid::shape::{Pose, Shape};
+use crate::error::Warning;
 pub use crate::robot::geometry::Obstacle;
 use crate::robot::{Motion, Robot};
-use crate::error::Warning;
+use crate::solid::distance::{Separation, separation, separation_from_plane};
+use crate::solid::shape::{Pose, Shape};
 use nalgebra::{Rotation3, Unit, Vector3};
 
 /// A volume of the robot.
@@ -71,9 +71,57 @@ pub struct Scene {
     pub warnings: Vec<Warning>,
 }
 
+/// Balls about all volumes and solid obstacles of a scene: a quick lower bound of any distance.
+#[derive(Debug, Clone, Default)]
+pub struct Balls {
+    volumes: Vec<(Option<usize>, Vector3<f64>, f64)>,
+    obstacles: Vec<Option<(Vector3<f64>, f64)>>,
+}
+
+impl Balls {
+    /// Of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        let of = |v: &Volume| {
+            let (centre, radius) = v.shape.ball();
+            (v.body, centre, radius)
+        };
+        Balls {
+            volumes: scene.volumes.iter().map(of).collect(),
+            obstacles: (scene.obstacles.iter())
+                .map(|o| match o {
+                    Obstacle::Plane { .. } => None,
+                    Obstacle::Solid { shape, .. } => Some(shape.ball()),
+                })
+                .collect(),
+        }
+    }
+
+    /// A distance that the pair is not nearer than; minus infinity where only the exact one is cheap.
+    pub fn lower_bound(&self, pair: &Pair, poses: &[Pose]) -> f64 {
+        let at = |&(body, centre, radius): &(Option<usize>, Vector3<f64>, f64)| {
+            (body.map_or(centre, |b| poses[b].apply(&centre)), radius)
+        };
+        let (a, ra) = at(&self.volumes[pair.volume]);
+        let other = match pair.partner {
+            Partner::Volume(v) => Some(at(&self.volumes[v])),
+            Partner::Obstacle(o) => self.obstacles[o],
+        };
+        match other {
+            Some((b, rb)) => (b - a).norm() - ra - rb,
+            None => f64::NEG_INFINITY,
+        }
+    }
+}
+
 /// Poses of all bodies in the base frame at one posture, parents before children.
 pub fn poses(robot: &Robot, q: &[f64], out: &mut Vec<Pose>) {
     out.clear();
+    append_poses(robot, q, out);
+}
+
+/// [`poses`] behind what is there already.
+pub fn append_poses(robot: &Robot, q: &[f64], out: &mut Vec<Pose>) {
+    let first = out.len();
     for body in &robot.bodies {
         let x = body.ratio * q[body.coordinate] + body.offset;
         let (turn, slide) = match body.motion {
@@ -91,7 +139,7 @@ pub fn poses(robot: &Robot, q: &[f64], out: &mut Vec<Pose>) {
             position: body.position + body.rotation * slide,
         };
         out.push(match body.parent {
-            Some(p) => out[p].then(&joint),
+            Some(p) => out[first + p].then(&joint),
             None => joint,
         });
     }
@@ -130,6 +178,36 @@ impl Scene {
                 }
             },
         }
+    }
+
+    /// A distance that the pair is not nearer than: the gap between the two along a unit direction.
+    pub fn gap_along(&self, pair: &Pair, poses: &[Pose], n: &Vector3<f64>) -> f64 {
+        let a = &self.volumes[pair.volume];
+        let far = a.shape.extent(&Self::pose(a.body, poses), n)[1];
+        let near = match pair.partner {
+            Partner::Volume(v) => {
+                let b = &self.volumes[v];
+                b.shape.extent(&Self::pose(b.body, poses), n)[0]
+            }
+            Partner::Obstacle(o) => match &self.obstacles[o] {
+                Obstacle::Plane { .. } => f64::NEG_INFINITY,
+                Obstacle::Solid { shape, .. } => shape.extent(&Pose::identity(), n)[0],
+            },
+        };
+        near - far
+    }
+
+    /// Whether the exact distance of a pair takes an iteration: one of the two is a box.
+    pub fn iterates(&self, pair: &Pair) -> bool {
+        let boxed = |s: &Shape| matches!(s, Shape::Box { .. });
+        let other = match pair.partner {
+            Partner::Volume(v) => boxed(&self.volumes[v].shape),
+            Partner::Obstacle(o) => match &self.obstacles[o] {
+                Obstacle::Plane { .. } => return false,
+                Obstacle::Solid { shape, .. } => boxed(shape),
+            },
+        };
+        other || boxed(&self.volumes[pair.volume].shape)
     }
 
     /// Derivative of the distance of a pair by each coordinate: `∂d/∂q_j = nᵀ (∂b/∂q_j − ∂a/∂q_j)`,

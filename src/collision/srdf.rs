@@ -11,7 +11,9 @@ const LARGEST: u64 = 64 << 20;
 /// # Errors
 /// A file that cannot be read or is no SRDF.
 pub(super) fn disabled(path: &Path) -> Result<Vec<[String; 2]>> {
-    let size = std::fs::metadata(path).map_err(|e| Error::io(path, e))?.len();
+    let size = std::fs::metadata(path)
+        .map_err(|e| Error::io(path, e))?
+        .len();
     if size > LARGEST {
         return Err(Error::file(path, "", "larger than 64 MiB: this is no SRDF"));
     }

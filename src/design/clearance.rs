@@ -14,11 +14,12 @@ use super::information::{Evaluation, Information};
 use super::path::{PathLimits, PathMemory, PathRow};
 use crate::collision::Scene;
 use crate::collision::clearance::reaches;
-use crate::collision::scene::poses;
+use crate::collision::scene::{Balls, append_poses};
 use crate::dynamics::Samples;
 use crate::robot::Robot;
 use crate::solid::{Pose, Separation};
 use crate::trajectory::{Basis, Table};
+use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// Samples a period for each harmonic.
@@ -26,15 +27,24 @@ const SAMPLES: usize = 80;
 /// Room kept for what happens between the samples, m.
 const BETWEEN: f64 = 2e-3;
 /// Pairs nearer than this beyond their margin get rows, m.
-const NEAR: f64 = 0.12;
-/// … and a row at every sample where they are nearer than this, m.
+const NEAR: f64 = 0.08;
+/// … and a row at every few samples where they are nearer than this, m.
 const TIGHT: f64 = 0.012;
+/// Samples between two rows of that kind.
+const SPACING: usize = 5;
+/// Of this many samples the first look takes one.
+const COARSE: usize = 10;
 /// A use of `1 + 1` stands for this much too near, m.
 const UNIT: f64 = 0.05;
 
 /// Clearances of a tree.
 pub(super) struct ClearanceLimits<'a> {
     scene: Arc<Scene>,
+    balls: Balls,
+    /// pairs of the same two links
+    groups: Vec<Vec<usize>>,
+    /// pairs whose exact distance is expensive
+    iterates: Vec<bool>,
     robot: &'a Robot,
     /// `N × m`: positions at the samples from the free numbers of a joint, sample by sample
     rows: Vec<f64>,
@@ -45,6 +55,15 @@ pub(super) struct ClearanceLimits<'a> {
     change: Vec<f64>,
     /// least distance of each pair, m
     need: Vec<f64>,
+}
+
+/// Indices of the pairs of the same two names.
+fn groups(scene: &Scene) -> Vec<Vec<usize>> {
+    let mut by_names: std::collections::BTreeMap<[&str; 2], Vec<usize>> = Default::default();
+    for (p, pair) in scene.pairs.iter().enumerate() {
+        by_names.entry(scene.names(pair)).or_default().push(p);
+    }
+    by_names.into_values().collect()
 }
 
 /// A pair at an instant.
@@ -93,6 +112,9 @@ impl<'a> ClearanceLimits<'a> {
             rest: basis.offset.iter().map(|o| o[0]).collect(),
             change,
             need,
+            balls: Balls::new(&scene),
+            groups: groups(&scene),
+            iterates: scene.pairs.iter().map(|p| scene.iterates(p)).collect(),
             scene,
         }
     }
@@ -101,37 +123,70 @@ impl<'a> ClearanceLimits<'a> {
         &self.rows[sample * self.free..(sample + 1) * self.free]
     }
 
-    /// Poses of all bodies at all samples.
-    fn along(&self, x: &[f64]) -> Vec<Vec<Pose>> {
+    /// Poses of all bodies at every `stride`-th sample, sample by sample.
+    fn along(&self, x: &[f64], stride: usize) -> Vec<Pose> {
         let mut q = vec![0.0; self.rest.len()];
-        (0..self.count)
-            .map(|i| {
-                let row = self.row(i);
-                for (j, q) in q.iter_mut().enumerate() {
-                    let own = &x[j * self.free..(j + 1) * self.free];
-                    *q = self.rest[j] + row.iter().zip(own).map(|(r, x)| r * x).sum::<f64>();
-                }
-                let mut at = Vec::with_capacity(self.robot.bodies.len());
-                poses(self.robot, &q, &mut at);
-                at
-            })
-            .collect()
+        let mut out = Vec::with_capacity(self.count * self.robot.bodies.len());
+        for i in (0..self.count).step_by(stride) {
+            let row = self.row(i);
+            for (j, q) in q.iter_mut().enumerate() {
+                let own = &x[j * self.free..(j + 1) * self.free];
+                *q = self.rest[j] + row.iter().zip(own).map(|(r, x)| r * x).sum::<f64>();
+            }
+            append_poses(self.robot, &q, &mut out);
+        }
+        out
     }
 
-    /// Least room over all pairs and samples; ends at the first that is below `enough`.
-    fn least(&self, along: &[Vec<Pose>], enough: f64) -> (f64, usize, usize) {
+    fn at<'p>(&self, along: &'p [Pose], sample: usize) -> &'p [Pose] {
+        let n = self.robot.bodies.len();
+        &along[sample * n..(sample + 1) * n]
+    }
+
+    /// Room of a pair at a sample, or a lower bound of it that is more than `far`; `axis` is the direction along
+    /// which the two were last found apart.
+    fn room(&self, p: usize, at: &[Pose], far: f64, axis: &mut Vector3<f64>) -> f64 {
+        let pair = &self.scene.pairs[p];
+        let need = self.need[p];
+        let bound = self.balls.lower_bound(pair, at) - need;
+        if bound > far {
+            return bound;
+        }
+        if !self.iterates[p] {
+            return self.scene.separation(pair, at).distance - need;
+        }
+        if *axis != Vector3::zeros() {
+            let bound = self.scene.gap_along(pair, at, axis) - need;
+            if bound > far {
+                return bound;
+            }
+        }
+        let found = self.scene.separation(pair, at);
+        *axis = found.normal;
+        found.distance - need
+    }
+
+    /// Least room over all pairs and samples, where it is negative, else something positive; ends at the first
+    /// that is below `enough`. Pairs are looked at from `first` on.
+    fn least(&self, along: &[Pose], enough: f64, first: usize) -> (f64, usize, usize) {
+        let pairs = self.scene.pairs.len();
+        let samples = along.len() / self.robot.bodies.len().max(1);
+        // of every so many samples one
+        let stride = (self.count / samples.max(1)).max(1);
         let mut least = (f64::INFINITY, 0, 0);
-        for (p, pair) in self.scene.pairs.iter().enumerate() {
+        for k in 0..pairs {
+            let p = (first + k) % pairs;
+            let mut axis = Vector3::zeros();
             let mut i = 0;
-            while i < self.count {
-                let room = self.scene.separation(pair, &along[i]).distance - self.need[p];
+            while i < samples {
+                let room = self.room(p, self.at(along, i), 0.0, &mut axis);
                 if room < least.0 {
-                    least = (room, p, i);
+                    least = (room, p, i * stride);
                     if room < enough {
                         return least;
                     }
                 }
-                i += self.skip(p, room - least.0.min(0.0));
+                i += self.skip(p, room).div_ceil(stride);
             }
         }
         least
@@ -147,26 +202,40 @@ impl<'a> ClearanceLimits<'a> {
         }
     }
 
-    /// Pairs at the instants where they are near: local minima, and every instant where they are very near.
-    fn near(&self, along: &[Vec<Pose>], from: f64, tight: f64) -> Vec<Instant> {
+    /// Pairs at the instants where they are near: local minima over time of the nearest volumes of two links, and
+    /// some of the instants where these are very near.
+    fn near(&self, along: &[Pose], from: f64, tight: f64) -> Vec<Instant> {
         let mut out = Vec::new();
-        let mut rooms = vec![f64::INFINITY; self.count];
-        for (p, pair) in self.scene.pairs.iter().enumerate() {
-            rooms.fill(f64::INFINITY);
-            let mut i = 0;
-            while i < self.count {
-                rooms[i] = self.scene.separation(pair, &along[i]).distance - self.need[p];
-                i += self.skip(p, rooms[i] - from);
+        let mut rooms = vec![(f64::INFINITY, 0); self.count];
+        for group in &self.groups {
+            rooms.fill((f64::INFINITY, 0));
+            for &p in group {
+                let mut axis = Vector3::zeros();
+                let mut i = 0;
+                while i < self.count {
+                    let room = self.room(p, self.at(along, i), from, &mut axis);
+                    if room < rooms[i].0 {
+                        rooms[i] = (room, p);
+                    }
+                    i += self.skip(p, room - from);
+                }
             }
+            let mut last = usize::MAX;
             for i in 0..self.count {
-                let before = rooms[(i + self.count - 1) % self.count];
-                let after = rooms[(i + 1) % self.count];
-                let here = rooms[i];
-                if here < from && (here < tight || here <= before && here < after) {
+                let (here, pair) = rooms[i];
+                let before = rooms[(i + self.count - 1) % self.count].0;
+                let after = rooms[(i + 1) % self.count].0;
+                let lowest = here <= before && here < after;
+                let spaced = last == usize::MAX || i >= last + SPACING;
+                if here < from && (lowest || here < tight && spaced) {
+                    last = i;
+                    let separation = self
+                        .scene
+                        .separation(&self.scene.pairs[pair], self.at(along, i));
                     out.push(Instant {
-                        pair: p,
+                        pair,
                         sample: i,
-                        separation: self.scene.separation(pair, &along[i]),
+                        separation,
                     });
                 }
             }
@@ -189,17 +258,27 @@ impl<'a> ClearanceLimits<'a> {
 }
 
 impl PathLimits for ClearanceLimits<'_> {
-    fn used(&self, _: &Information, x: &[f64], _: &Samples, _: &mut PathMemory) -> f64 {
-        1.0 - self.least(&self.along(x), 0.0).0 / UNIT
+    fn used(&self, _: &Information, x: &[f64], _: &Samples, memory: &mut PathMemory) -> f64 {
+        let mut room = 0.0;
+        // a few samples show most of what is broken, and the pair that was in the way is so again
+        for stride in [COARSE, 1] {
+            let (least, pair, _) = self.least(&self.along(x, stride), 0.0, memory.pair);
+            room = least;
+            if room < 0.0 {
+                memory.pair = pair;
+                break;
+            }
+        }
+        1.0 - room / UNIT
     }
 
     fn rows(&self, _: &Information, x: &[f64], _: &mut Evaluation, _: f64) -> Vec<PathRow> {
-        let along = self.along(x);
+        let along = self.along(x, 1);
         let near = self.near(&along, NEAR, TIGHT);
         near.iter()
             .map(|at| PathRow {
                 gradient: self
-                    .gradient(at, &along[at.sample])
+                    .gradient(at, self.at(&along, at.sample))
                     .iter()
                     .map(|g| -g)
                     .collect(),
@@ -209,13 +288,13 @@ impl PathLimits for ClearanceLimits<'_> {
     }
 
     fn cuts(&self, _: &Information, x: &[f64], next: &[f64]) -> Vec<PathRow> {
-        let along = self.along(next);
+        let along = self.along(next, 1);
         let broken = self.near(&along, 0.0, 0.0);
         broken
             .iter()
             .map(|at| {
                 // around the step that is refused: d̄ + g·(x + δ − x̄) ≥ need
-                let g = self.gradient(at, &along[at.sample]);
+                let g = self.gradient(at, self.at(&along, at.sample));
                 let moved: f64 = (g.iter().zip(x).zip(next))
                     .map(|((g, x), n)| g * (x - n))
                     .sum();
@@ -228,7 +307,7 @@ impl PathLimits for ClearanceLimits<'_> {
     }
 
     fn broken(&self, _: &Information, x: &[f64], _: &Samples) -> String {
-        let (room, pair, _) = self.least(&self.along(x), f64::NEG_INFINITY);
+        let (room, pair, _) = self.least(&self.along(x, 1), f64::NEG_INFINITY, 0);
         let pair = &self.scene.pairs[pair.min(self.scene.pairs.len() - 1)];
         match room < 0.0 {
             true => {

@@ -13,13 +13,8 @@ use crate::mechanism::{MechanismWorkspace, TaskDerivatives};
 pub trait PathLimits: Sync {
     /// Largest use of any of the limits by a motion at the samples: at most 1 inside, infinite or
     /// not a number where the motion cannot be made.
-    fn used(
-        &self,
-        info: &Information,
-        x: &[f64],
-        motion: &Samples,
-        memory: &mut PathMemory,
-    ) -> f64;
+    fn used(&self, info: &Information, x: &[f64], motion: &Samples, memory: &mut PathMemory)
+    -> f64;
 
     /// Linearised limits of which more than `from` is used, at an evaluated point.
     fn rows(&self, info: &Information, x: &[f64], e: &mut Evaluation, from: f64) -> Vec<PathRow>;
@@ -58,6 +53,8 @@ pub struct PathMemory {
     pub mechanism: MechanismWorkspace,
     /// gradients of closed chains
     pub task: TaskDerivatives,
+    /// the pair that came too near last
+    pub pair: usize,
 }
 
 /// Room that a linearised row leaves, as a fraction of the limit.

@@ -138,7 +138,9 @@ impl Source<'_> {
                 let mut factor = rng.random_range(0.6..0.98);
                 let mut own: Vec<f64>;
                 loop {
-                    own = (0..m).map(|k| still[k] + factor * (full[k] - still[k])).collect();
+                    own = (0..m)
+                        .map(|k| still[k] + factor * (full[k] - still[k]))
+                        .collect();
                     if limits.gauge(j, &own, &mut work) <= 1.0 || factor < 1e-6 {
                         break;
                     }

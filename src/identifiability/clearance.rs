@@ -60,7 +60,10 @@ impl Clearances {
                 .map(|k| motion.q[k * motion.count + i])
                 .collect();
             poses(plant.robot(), &plant.posture(&x)?, &mut at);
-            let all = scene.pairs.iter().map(|p| scene.separation(p, &at).distance);
+            let all = scene
+                .pairs
+                .iter()
+                .map(|p| scene.separation(p, &at).distance);
             least.push(all.fold(f64::INFINITY, f64::min));
         }
         Ok(Clearances {

@@ -4,8 +4,8 @@ use super::page::reproduce::seed;
 use super::page::verdict::{verdict, violations};
 use crate::design::record::Record;
 use crate::identifiability::{Assessment, Excitation, Platform};
-use crate::trajectory::{Proof, Space};
 use crate::trajectory::certificate::{JointCertificate, Peak};
+use crate::trajectory::{Proof, Space};
 use serde_json::{Map, Value, json};
 
 /// What stands for infinity: JSON has none.

@@ -25,12 +25,12 @@ mod values;
 pub use crate::robot::{Column, Parameter};
 pub use certify::Certified;
 #[doc(hidden)]
-pub use scene::SeriesPath;
-pub use scene::{ClearanceCertificate, PairClearance};
-#[doc(hidden)]
 pub use follow::Rates;
 #[doc(hidden)]
 pub use noise::DEFAULT_NOISE;
+#[doc(hidden)]
+pub use scene::SeriesPath;
+pub use scene::{ClearanceCertificate, PairClearance};
 
 use crate::base::{self, BaseParameters};
 use crate::collision::Scene;

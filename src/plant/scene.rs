@@ -80,7 +80,9 @@ impl Plant {
         let states = self.random_states(POSTURES, SEED);
         let postures: Vec<Vec<f64>> = (0..states.count)
             .filter_map(|i| {
-                let x: Vec<f64> = (0..states.dof).map(|k| states.q[k * states.count + i]).collect();
+                let x: Vec<f64> = (0..states.dof)
+                    .map(|k| states.q[k * states.count + i])
+                    .collect();
                 self.posture(&x).ok()
             })
             .collect();
@@ -146,10 +148,17 @@ impl Plant {
         }
         let step = fourier.period / SAMPLES as f64;
         Ok(by_names(along.iter().enumerate().map(|(p, d)| {
-            let least = (0..SAMPLES).min_by(|a, b| d[*a].total_cmp(&d[*b])).unwrap_or(0);
-            let second = |i: usize| d[(i + 1) % SAMPLES] - 2.0 * d[i] + d[(i + SAMPLES - 1) % SAMPLES];
+            let least = (0..SAMPLES)
+                .min_by(|a, b| d[*a].total_cmp(&d[*b]))
+                .unwrap_or(0);
+            let second =
+                |i: usize| d[(i + 1) % SAMPLES] - 2.0 * d[i] + d[(i + SAMPLES - 1) % SAMPLES];
             let bend = (0..SAMPLES).map(|i| second(i).abs()).fold(0.0, f64::max);
-            named(scene, p, [d[least], least as f64 * step, d[least] - 0.25 * bend])
+            named(
+                scene,
+                p,
+                [d[least], least as f64 * step, d[least] - 0.25 * bend],
+            )
         })))
     }
 }

@@ -138,11 +138,32 @@ fn support(va: &[V], vb: &[V], d: &V) -> Vertex {
     Vertex { w: b - a, a, b }
 }
 
+/// Some of the at most four vertices of a simplex, and their weights.
+#[derive(Clone, Copy)]
+struct Carried {
+    count: usize,
+    at: [usize; 4],
+    weights: [f64; 4],
+}
+
+impl Carried {
+    fn sum(&self, s: &[Vertex], of: fn(&Vertex) -> V) -> V {
+        (0..self.count).fold(V::zeros(), |sum, k| {
+            sum + of(&s[self.at[k]]) * self.weights[k]
+        })
+    }
+}
+
 /// Nearest points of two convex hulls; equal points where they overlap.
 fn gjk(va: &[V], vb: &[V]) -> (V, V) {
     let first = support(va, vb, &(va[0] - vb[0]));
-    let mut simplex = vec![first];
-    let mut weights = vec![1.0];
+    let mut simplex = [first; 5];
+    let mut count = 1;
+    let mut carried = Carried {
+        count: 1,
+        at: [0; 4],
+        weights: [1.0, 0.0, 0.0, 0.0],
+    };
     let mut nearest = first.w;
     for _ in 0..64 {
         let length = nearest.norm();
@@ -154,48 +175,62 @@ fn gjk(va: &[V], vb: &[V]) -> (V, V) {
         if nearest.dot(&(nearest - next.w)) <= 1e-13 * (length * length).max(1e-12) {
             break;
         }
-        if simplex.iter().any(|v| v.w == next.w) {
+        if count == 4 || simplex[..count].iter().any(|v| v.w == next.w) {
             break;
         }
-        simplex.push(next);
-        let (kept, found) = nearest_of_simplex(&simplex);
-        let point = kept
-            .iter()
-            .zip(&found)
-            .fold(V::zeros(), |sum, (k, w)| sum + simplex[*k].w * *w);
-        simplex = kept.iter().map(|k| simplex[*k]).collect();
-        weights = found;
+        simplex[count] = next;
+        count += 1;
+        let found = nearest_of_simplex(&simplex[..count]);
+        let point = found.sum(&simplex, |v| v.w);
+        let kept = found.at.map(|k| simplex[k]);
+        count = found.count;
+        simplex[..4].copy_from_slice(&kept);
+        carried = Carried {
+            at: [0, 1, 2, 3],
+            ..found
+        };
         if point.norm() >= length {
             break;
         }
         nearest = point;
     }
-    let sum = |of: fn(&Vertex) -> V| {
-        let weighted = simplex.iter().zip(&weights);
-        weighted.fold(V::zeros(), |sum, (v, w)| sum + of(v) * *w)
-    };
-    (sum(|v| v.a), sum(|v| v.b))
+    (
+        carried.sum(&simplex, |v| v.a),
+        carried.sum(&simplex, |v| v.b),
+    )
 }
 
 /// The point of a simplex of up to four vertices nearest to the origin: which vertices carry it and
 /// their weights. Every face is tried; the nearest one that holds its own projection is the answer.
-fn nearest_of_simplex(s: &[Vertex]) -> (Vec<usize>, Vec<f64>) {
-    let mut best = (vec![0], vec![1.0]);
+fn nearest_of_simplex(s: &[Vertex]) -> Carried {
+    let mut best = Carried {
+        count: 1,
+        at: [0; 4],
+        weights: [1.0, 0.0, 0.0, 0.0],
+    };
     let mut least = f64::INFINITY;
     for mask in 1_usize..1 << s.len() {
-        let kept: Vec<usize> = (0..s.len()).filter(|i| mask >> i & 1 == 1).collect();
-        let Some(weights) = projection(s, &kept) else {
+        let mut kept = [0; 4];
+        let mut count = 0;
+        for i in 0..s.len() {
+            if mask >> i & 1 == 1 {
+                kept[count] = i;
+                count += 1;
+            }
+        }
+        let Some(weights) = projection(s, &kept[..count]) else {
             continue;
         };
-        let point = kept
-            .iter()
-            .zip(&weights)
-            .fold(V::zeros(), |sum, (k, w)| sum + s[*k].w * *w);
-        let d = point.norm_squared();
+        let found = Carried {
+            count,
+            at: kept,
+            weights,
+        };
+        let d = found.sum(s, |v| v.w).norm_squared();
         // of faces that are equally near the one of fewest vertices
         if d < least - 1e-15 * least.min(1.0) {
             least = d;
-            best = (kept, weights);
+            best = found;
         }
     }
     best
@@ -203,12 +238,15 @@ fn nearest_of_simplex(s: &[Vertex]) -> (Vec<usize>, Vec<f64>) {
 
 /// Barycentric weights of the origin's projection on the affine hull of these vertices, where none is
 /// negative.
-fn projection(s: &[Vertex], kept: &[usize]) -> Option<Vec<f64>> {
+fn projection(s: &[Vertex], kept: &[usize]) -> Option<[f64; 4]> {
     let origin = s[kept[0]].w;
-    let edges: Vec<V> = kept[1..].iter().map(|k| s[*k].w - origin).collect();
-    let n = edges.len();
+    let n = kept.len() - 1;
     if n == 0 {
-        return Some(vec![1.0]);
+        return Some([1.0, 0.0, 0.0, 0.0]);
+    }
+    let mut edges = [V::zeros(); 3];
+    for (e, k) in edges.iter_mut().zip(&kept[1..]) {
+        *e = s[*k].w - origin;
     }
     // normal equations of at most three edges, by Gaussian elimination with pivoting
     let mut m = [[0.0; 4]; 3];
@@ -235,10 +273,12 @@ fn projection(s: &[Vertex], kept: &[usize]) -> Option<Vec<f64>> {
             }
         }
     }
-    let tail: Vec<f64> = (0..n).map(|i| m[i][3] / m[i][i]).collect();
-    let head = 1.0 - tail.iter().sum::<f64>();
-    let weights: Vec<f64> = std::iter::once(head).chain(tail).collect();
-    weights.iter().all(|w| *w >= 0.0).then_some(weights)
+    let mut weights = [1.0, 0.0, 0.0, 0.0];
+    for i in 0..n {
+        weights[i + 1] = m[i][3] / m[i][i];
+        weights[0] -= weights[i + 1];
+    }
+    weights[..=n].iter().all(|w| *w >= 0.0).then_some(weights)
 }
 
 /// Least translation of `B` that parts two overlapping cores: its length and its direction, over the

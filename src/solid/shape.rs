@@ -132,6 +132,35 @@ impl Shape {
         }
     }
 
+    /// Least and largest `nᵀ p` over the points of the shape on a body at this pose, m.
+    pub fn extent(&self, body: &Pose, n: &Vector3<f64>) -> [f64; 2] {
+        let [low, high] = match self {
+            Shape::Sphere { centre, .. } => [n.dot(&body.apply(centre)); 2],
+            Shape::Capsule { from, to, .. } => {
+                let (a, b) = (n.dot(&body.apply(from)), n.dot(&body.apply(to)));
+                [a.min(b), a.max(b)]
+            }
+            Shape::Box { pose, half } => {
+                let local = pose.rotation.tr_mul(&body.rotation.tr_mul(n));
+                let middle = n.dot(&body.apply(&pose.position));
+                let reach = local.abs().dot(half);
+                [middle - reach, middle + reach]
+            }
+        };
+        [low - self.radius(), high + self.radius()]
+    }
+
+    /// A ball that holds the shape: its centre in the body's frame and its radius, m.
+    pub fn ball(&self) -> (Vector3<f64>, f64) {
+        match self {
+            Shape::Sphere { centre, radius } => (*centre, *radius),
+            Shape::Capsule { from, to, radius } => {
+                ((from + to) * 0.5, 0.5 * (to - from).norm() + radius)
+            }
+            Shape::Box { pose, half } => (pose.position, half.norm()),
+        }
+    }
+
     /// Radius of the ball about the body's origin that holds the shape, m.
     pub fn reach(&self) -> f64 {
         let mut v = [Vector3::zeros(); 8];

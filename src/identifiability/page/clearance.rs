@@ -145,7 +145,14 @@ fn table(pairs: &[PairClearance]) -> Markup {
         })
         .collect();
     html::table(
-        &["", "", "least, mm", "at, s", "never below, mm", "margin, mm"],
+        &[
+            "",
+            "",
+            "least, mm",
+            "at, s",
+            "never below, mm",
+            "margin, mm",
+        ],
         &[0, 1],
         &rows,
     )
@@ -172,7 +179,13 @@ fn volumes(c: &Clearances) -> Markup {
         })
         .collect();
     html::table(
-        &["link", "origin", "volumes", "of the convex hull's volume", "reach outside it, mm"],
+        &[
+            "link",
+            "origin",
+            "volumes",
+            "of the convex hull's volume",
+            "reach outside it, mm",
+        ],
         &[0, 1],
         &rows,
     )

@@ -13,11 +13,15 @@ const UNEXCITED: f64 = 1e7;
 /// What no verdict may leave out: what is known of collisions.
 fn collisions(e: &Excitation) -> String {
     let Some(c) = &e.clearance else {
-        return "Collisions of the robot with itself and with its surroundings were not checked.".into();
+        return "Collisions of the robot with itself and with its surroundings were not checked."
+            .into();
     };
     let unseen = match c.certificate.unseen.as_slice() {
         [] => String::new(),
-        all => format!(" The volume of {} is not known and was not looked at.", all.join(", ")),
+        all => format!(
+            " The volume of {} is not known and was not looked at.",
+            all.join(", ")
+        ),
     };
     format!("Collisions: {}.{unseen}", clearance::sentence(c))
 }

@@ -142,7 +142,10 @@ impl Entries<'_> {
                 Some([x, y, z]) if !(x + y + z).is_nan() => Some(Vector3::new(*x, *y, *z)),
                 Some(_) => None,
             };
-            let (low, high) = (corner(&k.low, f64::NEG_INFINITY), corner(&k.high, f64::INFINITY));
+            let (low, high) = (
+                corner(&k.low, f64::NEG_INFINITY),
+                corner(&k.high, f64::INFINITY),
+            );
             let (Some(low), Some(high)) = (low, high) else {
                 let message = "low and high are three numbers each, in m (inf for no bound)";
                 return Err(source.error(at, &what, message));
@@ -191,9 +194,7 @@ fn plane(source: Text, what: &str, name: String, o: &ShapeEntry) -> Result<Obsta
 /// Three finite numbers of a plausible size.
 fn three(list: Option<&[f64]>) -> Option<Vector3<f64>> {
     match list? {
-        [x, y, z] if [x, y, z].iter().all(|v| v.abs() <= LARGEST) => {
-            Some(Vector3::new(*x, *y, *z))
-        }
+        [x, y, z] if [x, y, z].iter().all(|v| v.abs() <= LARGEST) => Some(Vector3::new(*x, *y, *z)),
         _ => None,
     }
 }
@@ -205,17 +206,21 @@ fn shape(source: Text, what: &str, e: &ShapeEntry) -> Result<Shape> {
     let (needs, found) = match e.kind.get_ref().as_str() {
         "capsule" => {
             let ends = three(e.from.as_deref()).zip(three(e.to.as_deref()));
-            let found = ends.zip(radius).map(|((from, to), radius)| Shape::Capsule {
-                from,
-                to,
-                radius,
-            });
-            ("a capsule has from = [x, y, z], to = [x, y, z] and radius > 0, in m", found)
+            let found =
+                ends.zip(radius)
+                    .map(|((from, to), radius)| Shape::Capsule { from, to, radius });
+            (
+                "a capsule has from = [x, y, z], to = [x, y, z] and radius > 0, in m",
+                found,
+            )
         }
         "sphere" => {
             let found = three(e.centre.as_deref()).zip(radius);
             let found = found.map(|(centre, radius)| Shape::Sphere { centre, radius });
-            ("a sphere has centre = [x, y, z] and radius > 0, in m", found)
+            (
+                "a sphere has centre = [x, y, z] and radius > 0, in m",
+                found,
+            )
         }
         "box" => {
             let size = three(e.size.as_deref()).filter(|s| s.min() > 0.0);
@@ -223,10 +228,12 @@ fn shape(source: Text, what: &str, e: &ShapeEntry) -> Result<Shape> {
                 None => Some(Pose::identity()),
                 Some(list) if list.len() == 6 => {
                     let angles = three(Some(&list[3..]));
-                    three(Some(&list[..3])).zip(angles).map(|(position, rpy)| Pose {
-                        rotation: meant::rotation(&rpy),
-                        position,
-                    })
+                    three(Some(&list[..3]))
+                        .zip(angles)
+                        .map(|(position, rpy)| Pose {
+                            rotation: meant::rotation(&rpy),
+                            position,
+                        })
                 }
                 Some(_) => None,
             };

@@ -31,9 +31,9 @@ pub(super) fn mesh(name: &str, folders: &[PathBuf]) -> Option<PathBuf> {
     let found = |path: PathBuf| path.is_file().then_some(path);
     if let Some(rest) = of_package {
         let (package, path) = rest.split_once('/').unwrap_or(("", rest));
-        return folders.iter().find_map(|f| {
-            found(f.join(package).join(path)).or_else(|| found(f.join(path)))
-        });
+        return folders
+            .iter()
+            .find_map(|f| found(f.join(package).join(path)).or_else(|| found(f.join(path))));
     }
     let plain = name.strip_prefix("file://").unwrap_or(name);
     let path = Path::new(plain);

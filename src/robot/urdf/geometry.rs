@@ -73,14 +73,16 @@ fn form(source: &Source, node: Node) -> Option<Form> {
                     half: size * 0.5,
                 })
             }),
-        "capsule" => number("radius").zip(number("length")).map(|(radius, length)| {
-            let half = Vector3::z() * (0.5 * length);
-            Form::Solid(Shape::Capsule {
-                from: pose.apply(&-half),
-                to: pose.apply(&half),
-                radius,
-            })
-        }),
+        "capsule" => number("radius")
+            .zip(number("length"))
+            .map(|(radius, length)| {
+                let half = Vector3::z() * (0.5 * length);
+                Form::Solid(Shape::Capsule {
+                    from: pose.apply(&-half),
+                    to: pose.apply(&half),
+                    radius,
+                })
+            }),
         "cylinder" => number("radius")
             .zip(number("length"))
             .map(|(radius, length)| Form::Cylinder {
@@ -101,7 +103,9 @@ fn form(source: &Source, node: Node) -> Option<Form> {
     };
     let tag = kind.tag_name().name();
     Some(found.unwrap_or_else(|| {
-        Form::Unreadable(format!("{place}: <{tag}> lacks sizes that are positive numbers"))
+        Form::Unreadable(format!(
+            "{place}: <{tag}> lacks sizes that are positive numbers"
+        ))
     }))
 }
 
