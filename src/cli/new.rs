@@ -32,6 +32,7 @@ pub fn run(args: Args) -> Result<()> {
     }
     let robot = Robot::load(&args.urdf.to_string_lossy())?;
     super::warn(&robot.warnings);
+    super::warn(&robot.geometry.volumes().warnings);
     let folder = match &args.output {
         Some(file) => file.parent().map(Path::to_path_buf),
         None => standard_output().and_then(|file| file.parent().map(Path::to_path_buf)),

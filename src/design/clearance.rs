@@ -27,11 +27,11 @@ const SAMPLES: usize = 80;
 /// Room kept for what happens between the samples, m.
 const BETWEEN: f64 = 2e-3;
 /// Pairs nearer than this beyond their margin get rows, m.
-const NEAR: f64 = 0.08;
+const NEAR: f64 = 0.04;
 /// … and a row at every few samples where they are nearer than this, m.
 const TIGHT: f64 = 0.012;
 /// Samples between two rows of that kind.
-const SPACING: usize = 5;
+const SPACING: usize = 8;
 /// Of this many samples the first look takes one.
 const COARSE: usize = 10;
 /// A use of `1 + 1` stands for this much too near, m.

@@ -308,8 +308,8 @@ impl State {
                 let before = rows.len();
                 task.limits.cut(x, &next, &mut rows, &mut self.work);
                 let mut more = match task.path {
-                    Some(path) => path.cuts(task.info, x, &next),
-                    None => Vec::new(),
+                    Some(path) if round == 1 => path.cuts(task.info, x, &next),
+                    _ => Vec::new(),
                 };
                 let missed = !more.is_empty();
                 path_rows.append(&mut more);

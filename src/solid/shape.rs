@@ -32,6 +32,15 @@ impl Pose {
         self.rotation * p + self.position
     }
 
+    /// `X_FW`.
+    pub fn inverse(&self) -> Pose {
+        let rotation = self.rotation.transpose();
+        Pose {
+            rotation,
+            position: -(rotation * self.position),
+        }
+    }
+
     /// `X_WF X_FG`.
     pub fn then(&self, other: &Pose) -> Pose {
         Pose {

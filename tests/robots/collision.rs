@@ -1,8 +1,8 @@
 //! Distances, gradients, fits and clearances against brute force.
 
-use excite::collision::clearance::{Path, clearances};
-use excite::collision::scene::{Obstacle, Scene, Volume, poses};
-use excite::collision::{Pose, Shape, fit, hull, mesh, separation};
+use excite::collision::clearance::{Fineness, Path, clearances};
+use excite::collision::scene::{Balls, Obstacle, Pair, Partner, Scene, Volume, poses};
+use excite::solid::{Pose, Shape, fit, hull, mesh, separation};
 use excite::robot::{Body, Inertia, Joint, Motion, Robot};
 use nalgebra::{Rotation3, Vector3};
 
@@ -234,7 +234,22 @@ fn scene(r: &mut Random, robot: &Robot) -> Scene {
             radius: 0.1,
         },
     });
-    s.pairs = s.all_pairs(robot, |_, _| false);
+    let parent = |v: usize| s.volumes[v].body.map(|b| robot.bodies[b].parent);
+    let joined = |a: usize, b: usize| {
+        let (x, y) = (s.volumes[a].body, s.volumes[b].body);
+        parent(a) == Some(y) || parent(b) == Some(x)
+    };
+    let moving = robot.bodies.len();
+    for volume in 0..moving {
+        let others = (volume + 1..s.volumes.len()).filter(|v| !joined(volume, *v));
+        let others = others.map(Partner::Volume).collect::<Vec<_>>();
+        let around = (0..s.obstacles.len()).map(Partner::Obstacle);
+        s.pairs.extend(others.into_iter().chain(around).map(|partner| Pair {
+            volume,
+            partner,
+            margin: 0.0,
+        }));
+    }
     s
 }
 
@@ -297,6 +312,9 @@ impl Path for Waves {
             *v = (0.5 * a[0] * a[1]).abs();
         }
     }
+    fn largest(&self, joint: usize) -> f64 {
+        0.5 * self.a[joint][0].abs()
+    }
     fn duration(&self) -> f64 {
         4.0
     }
@@ -313,7 +331,12 @@ fn no_instant_is_nearer_than_the_bound() {
                 .map(|_| [1.0, 2.0 + r.next(), 3.0 * r.next()])
                 .collect(),
         };
-        let found = clearances(&robot, &scene, &path, 200, 0.002, 1e-4);
+        let fine = Fineness {
+            stretches: 200,
+            tolerance: 0.002,
+            shortest: 1e-4,
+        };
+        let found = clearances(&robot, &scene, &path, fine);
         let mut q = vec![0.0; 6];
         let mut at = Vec::new();
         let mut least = vec![f64::INFINITY; scene.pairs.len()];
@@ -324,10 +347,20 @@ fn no_instant_is_nearer_than_the_bound() {
                 *l = l.min(scene.separation(p, &at).distance);
             }
         }
-        for (c, l) in found.iter().zip(&least) {
-            assert!(c.bound <= *l + 1e-12 && c.bound >= l - 0.01, "{c:?} {l}");
+        assert_eq!(found.len(), least.len());
+        let balls = Balls::new(&scene);
+        for c in &found {
+            let l = least[c.pair];
+            assert!(c.bound <= l + 1e-12, "{c:?} {l}");
             assert!(c.met >= l - 1e-3);
+            // a quick bound is one
+            let pair = &scene.pairs[c.pair];
+            let exact = scene.separation(pair, &at);
+            assert!(balls.lower_bound(pair, &at) <= exact.distance + 1e-12);
+            assert!(scene.gap_along(pair, &at, &exact.normal) <= exact.distance + 1e-9);
         }
+        // the nearest pair is known closely
+        assert!(found[0].bound >= least[found[0].pair] - 0.004, "{:?}", found[0]);
     }
 }
 

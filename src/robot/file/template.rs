@@ -1,6 +1,8 @@
 //! The commented `robot.toml` of `excite new`.
 
 use crate::robot::{JointTerm, Motion, Prior, Robot};
+use crate::solid::Shape;
+use nalgebra::{Rotation3, Vector3};
 use std::fmt::Write as _;
 
 /// A `robot.toml` with all joints and their present values; what has none is commented out.
@@ -101,5 +103,71 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
             identify.join(", ")
         );
     }
+    surroundings(robot, &mut out);
     out
+}
+
+/// `[collision]` and the volumes of the links, in link frames, a tenth of a millimetre larger than fitted.
+fn surroundings(robot: &Robot, out: &mut String) {
+    let quoted = |s: &str| toml::Value::String(s.to_string()).to_string();
+    let geometry = &robot.geometry;
+    if geometry.is_empty() {
+        return;
+    }
+    out.push_str(
+        "\n# What the robot must not touch. Volumes stand for the geometry of the URDF; remove one and it is \
+         fitted anew.\n[collision]\n",
+    );
+    let _ = match geometry.floor {
+        Some(floor) => writeln!(out, "floor = {floor}     # the plane z = 0 of the base frame"),
+        None => writeln!(out, "# floor = true     # the plane z = 0 of the base frame; true where the base stands on it"),
+    };
+    let margin = geometry.margin.unwrap_or(crate::robot::geometry::MARGIN);
+    let _ = writeln!(out, "margin = {margin:?}     # m: least distance of any two");
+    let pairs: Vec<String> = geometry
+        .ignore
+        .iter()
+        .map(|[a, b]| format!("[{}, {}]", quoted(a), quoted(b)))
+        .collect();
+    let _ = writeln!(out, "ignore = [{}]     # pairs of links that are not looked at", pairs.join(", "));
+    let three = |v: &Vector3<f64>| {
+        // no minus before a zero
+        let [x, y, z] = [v.x, v.y, v.z].map(|x| (1e4 * x).round() / 1e4 + 0.0);
+        format!("[{x:?}, {y:?}, {z:?}]")
+    };
+    let length = |x: f64| (1e4 * x).ceil() / 1e4 + 1e-4;
+    for volume in &geometry.volumes().links {
+        let link = &geometry.links[volume.link];
+        let name = quoted(&link.name);
+        for shape in &volume.shapes {
+            let _ = writeln!(out, "\n[[volume]]\nlink = {name}");
+            let _ = match shape.moved(&link.pose.inverse()) {
+                Shape::Sphere { centre, radius } => writeln!(
+                    out,
+                    "kind = \"sphere\"\ncentre = {}\nradius = {:.4}",
+                    three(&centre),
+                    length(radius)
+                ),
+                Shape::Capsule { from, to, radius } => writeln!(
+                    out,
+                    "kind = \"capsule\"\nfrom = {}\nto = {}\nradius = {:.4}",
+                    three(&from),
+                    three(&to),
+                    length(radius)
+                ),
+                Shape::Box { pose, half } => {
+                    let (r, p, y) = Rotation3::from_matrix_unchecked(pose.rotation).euler_angles();
+                    let at = pose.position;
+                    writeln!(
+                        out,
+                        "kind = \"box\"\nsize = {}\npose = [{:.5}, {:.5}, {:.5}, {r:.6}, {p:.6}, {y:.6}]",
+                        three(&half.map(|h| length(2.0 * h))),
+                        at.x,
+                        at.y,
+                        at.z
+                    )
+                }
+            };
+        }
+    }
 }
