@@ -173,7 +173,11 @@ impl Problem<'_> {
 
     /// The limit that a motion breaks at some time, in words.
     fn broken(&self, fourier: &Fourier) -> Result<Option<String>> {
-        Ok(self.plant.certify(fourier, self.settings.derate)?.broken())
+        let derate = self.settings.derate;
+        if let Some(broken) = self.plant.certify_limits(fourier, derate)?.broken() {
+            return Ok(Some(broken));
+        }
+        Ok(self.plant.certify(fourier, derate)?.broken())
     }
 
     /// Why there is no feasible trajectory.
@@ -189,9 +193,18 @@ impl Problem<'_> {
         };
         match broken.is_empty() {
             false => format!(
-                "{}: no feasible trajectory: at rest in the middle of its range {broken}; check \
-                 masses, gravity and the limits, or choose a start posture",
-                self.plant.name()
+                "{}: no feasible trajectory: at rest {} {broken}; check masses, gravity, the limits and what \
+                 stands around, or choose {} start posture",
+                self.plant.name(),
+                match self.settings.start {
+                    Some(_) => "in the start posture",
+                    None => "in the middle of its range",
+                },
+                if self.settings.start.is_some() {
+                    "another"
+                } else {
+                    "a"
+                },
             ),
             true => format!(
                 "{}: no trajectory that keeps the limits was found to excite every parameter; \

@@ -2,8 +2,8 @@
 
 use excite::collision::clearance::{Fineness, Path, clearances};
 use excite::collision::scene::{Balls, Obstacle, Pair, Partner, Scene, Volume, poses};
-use excite::solid::{Pose, Shape, fit, hull, mesh, separation};
 use excite::robot::{Body, Inertia, Joint, Motion, Robot};
+use excite::solid::{Pose, Shape, fit, hull, mesh, separation};
 use nalgebra::{Rotation3, Vector3};
 
 type V = Vector3<f64>;
@@ -244,11 +244,12 @@ fn scene(r: &mut Random, robot: &Robot) -> Scene {
         let others = (volume + 1..s.volumes.len()).filter(|v| !joined(volume, *v));
         let others = others.map(Partner::Volume).collect::<Vec<_>>();
         let around = (0..s.obstacles.len()).map(Partner::Obstacle);
-        s.pairs.extend(others.into_iter().chain(around).map(|partner| Pair {
-            volume,
-            partner,
-            margin: 0.0,
-        }));
+        s.pairs
+            .extend(others.into_iter().chain(around).map(|partner| Pair {
+                volume,
+                partner,
+                margin: 0.0,
+            }));
     }
     s
 }
@@ -360,7 +361,11 @@ fn no_instant_is_nearer_than_the_bound() {
             assert!(scene.gap_along(pair, &at, &exact.normal) <= exact.distance + 1e-9);
         }
         // the nearest pair is known closely
-        assert!(found[0].bound >= least[found[0].pair] - 0.004, "{:?}", found[0]);
+        assert!(
+            found[0].bound >= least[found[0].pair] - 0.004,
+            "{:?}",
+            found[0]
+        );
     }
 }
 

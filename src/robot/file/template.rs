@@ -119,17 +119,30 @@ fn surroundings(robot: &Robot, out: &mut String) {
          fitted anew.\n[collision]\n",
     );
     let _ = match geometry.floor {
-        Some(floor) => writeln!(out, "floor = {floor}     # the plane z = 0 of the base frame"),
-        None => writeln!(out, "# floor = true     # the plane z = 0 of the base frame; true where the base stands on it"),
+        Some(floor) => writeln!(
+            out,
+            "floor = {floor}     # the plane z = 0 of the base frame"
+        ),
+        None => writeln!(
+            out,
+            "# floor = true     # the plane z = 0 of the base frame; true where the base stands on it"
+        ),
     };
     let margin = geometry.margin.unwrap_or(crate::robot::geometry::MARGIN);
-    let _ = writeln!(out, "margin = {margin:?}     # m: least distance of any two");
+    let _ = writeln!(
+        out,
+        "margin = {margin:?}     # m: least distance of any two"
+    );
     let pairs: Vec<String> = geometry
         .ignore
         .iter()
         .map(|[a, b]| format!("[{}, {}]", quoted(a), quoted(b)))
         .collect();
-    let _ = writeln!(out, "ignore = [{}]     # pairs of links that are not looked at", pairs.join(", "));
+    let _ = writeln!(
+        out,
+        "ignore = [{}]     # pairs of links that are not looked at",
+        pairs.join(", ")
+    );
     let three = |v: &Vector3<f64>| {
         // no minus before a zero
         let [x, y, z] = [v.x, v.y, v.z].map(|x| (1e4 * x).round() / 1e4 + 0.0);
