@@ -25,6 +25,7 @@ use crate::base::BaseParameters;
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
+use crate::report::view::View;
 use crate::robot::Robot;
 use crate::trajectory::{Certificate, Proof, Trajectory, sample_period};
 use faer::linalg::solvers::Solve;
@@ -87,6 +88,9 @@ pub struct Excitation {
     pub platform: Option<Platform>,
     /// how near it brings the robot to itself and to what stands around; `None` where that was not looked at
     pub clearance: Option<Clearances>,
+    /// the robot along the motion, for the page
+    #[serde(skip)]
+    pub(crate) view: Option<View>,
 }
 
 /// The report before the run, of a robot alone or with a trajectory.
@@ -154,10 +158,11 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
              samples is bounded by twice the largest second difference, not proven",
         ));
     }
-    let clearance = match (plant.scene()?, certified.clearance) {
+    let scene = plant.scene()?;
+    let clearance = match (&scene, certified.clearance) {
         (Some(scene), Some(found)) => {
             all.warnings.extend(scene.warnings.iter().cloned());
-            Some(Clearances::of(plant, &scene, found, &motion)?)
+            Some(Clearances::of(plant, scene, found, &motion)?)
         }
         _ => None,
     };
@@ -167,10 +172,20 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
     };
     all.warnings
         .extend(unexcited(&condition, platform.is_some()));
+    let torque = plant.nominal_torque(&motion)?;
+    let actuators = plant.actuator_motion(&motion)?;
+    let view = page::view::fill(
+        plant,
+        trajectory.fourier.period,
+        &motion,
+        &actuators,
+        &torque,
+        scene.as_deref(),
+    )?;
     all.excitation = Some(Excitation {
         samples: motion.count * trajectory.periods as usize,
         trajectory: trajectory.clone(),
-        torque: plant.nominal_torque(&motion)?,
+        torque,
         condition,
         log_det,
         singular_values,
@@ -178,7 +193,8 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         certificate: certified.actuators,
         platform,
         clearance,
-        motion: plant.actuator_motion(&motion)?,
+        motion: actuators,
+        view: Some(view),
     });
     Ok(all)
 }

@@ -9,6 +9,7 @@ mod platform;
 pub(super) mod reproduce;
 mod spectrum;
 pub(super) mod verdict;
+pub(super) mod view;
 
 pub use verdict::{Grade, Verdict, verdict};
 
@@ -55,6 +56,7 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
     sections.extend(warnings(assessment));
     sections.push(Section::new("", tiles(assessment)));
     if let Some(e) = &assessment.excitation {
+        sections.extend(e.view.as_ref().and_then(view::section));
         if let Some(p) = &e.platform {
             sections.extend(platform::sections(e, p));
         }

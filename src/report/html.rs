@@ -1,4 +1,4 @@
-//! The page that every report stands in: one file, no scripts, nothing fetched.
+//! The page that every report stands in: one file, nothing fetched, no scripts but that of a view.
 
 use super::plot::{Colour, Shape};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -64,7 +64,7 @@ pub fn page(
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="generator" content=(concat!("excite ", env!("CARGO_PKG_VERSION")));
                 title { (title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(VIEW)) }
             }
             body {
                 header { h1 { (title) } p { (line) } }
@@ -143,6 +143,9 @@ pub fn table(head: &[&str], texts: &[usize], rows: &[Vec<Markup>]) -> Markup {
 pub fn details(summary: &str, body: Markup) -> Markup {
     html! { details { summary { (summary) } (body) } }
 }
+
+/// The style of a view in space.
+const VIEW: &str = include_str!("view/view.css");
 
 /// The style of all reports.
 const STYLE: &str = "

@@ -9,3 +9,4 @@ pub mod format;
 pub(crate) mod html;
 pub(crate) mod joints;
 pub(crate) mod plot;
+pub(crate) mod view;

@@ -10,3 +10,4 @@ mod mutations;
 mod rehearsal;
 mod report;
 mod surface;
+mod view;
