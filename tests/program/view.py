@@ -154,8 +154,11 @@ def play(b):
         "!(e.textContent.trim()||e.getAttribute('aria-label')||e.closest('label'))).length"
     )
     out["start"] = b.value(TIME)
+    b.value(
+        "(s=>{s.value='4';s.dispatchEvent(new Event('change',{bubbles:true}))})(document.querySelector('.view select'))"
+    )
     b.click(".view .play")
-    out["plays"] = b.until(f"{TIME} > {out['start']} + 0.2", 20)
+    out["plays"] = b.until(f"{TIME} > {out['start']} + 1.5", 30)
     b.key(" ", "Space", " ")
     b.value("new Promise(d=>setTimeout(d,100))")
     out["paused"] = b.value(TIME)

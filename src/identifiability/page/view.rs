@@ -287,7 +287,7 @@ impl Lines {
         let mut ends = Vec::with_capacity(samples.len());
         for s in samples.iter().map(|s| s % count.max(1)) {
             let x: Vec<f64> = (0..motion.dof).map(|k| motion.q[k * count + s]).collect();
-            let segments: Vec<Segment> = mechanism.geometry().segments(&x);
+            let segments = with_bars(mechanism.geometry().segments(&x));
             let now = || segments.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
             if segments.is_empty() || *names.get_or_insert_with(now) != now() {
                 return None;
@@ -299,6 +299,25 @@ impl Lines {
             ends,
         })
     }
+}
+
+/// With the bars that join the two rods of a parallelogram (`rod1a`, `rod1b`) at both ends.
+fn with_bars(mut segments: Vec<Segment>) -> Vec<Segment> {
+    let stem = |s: &Segment, end: char| s.name.strip_suffix(end).map(String::from);
+    let bars = segments.windows(2).flat_map(|pair| {
+        let of = stem(&pair[0], 'a').filter(|of| stem(&pair[1], 'b').as_ref() == Some(of));
+        let bar = |k: usize| [pair[0].ends[k], pair[1].ends[k]];
+        let both = of.map(|name| {
+            [0, 1].map(|k| Segment {
+                name: name.clone(),
+                ends: bar(k),
+            })
+        });
+        both.into_iter().flatten()
+    });
+    let bars: Vec<Segment> = bars.collect();
+    segments.extend(bars);
+    segments
 }
 
 /// A line by its name: `platform`, that of a body, or one with the number of its actuator (`leg3`, `rod3a`).

@@ -167,3 +167,17 @@ fn legs_are_lit_by_their_actuators() {
     // the passive joints between the base and it
     assert_eq!(lit(&plant, bodies[rod].parent.expect("a parent")), 3);
 }
+
+#[test]
+fn the_rods_of_a_parallelogram_are_joined() {
+    let plant = Plant::load("delta").expect("bundled");
+    let home = plant.home().expect("a home");
+    let plain = plant.mechanism().expect("closed").geometry().segments(home);
+    let all = with_bars(plain.clone());
+    assert_eq!(all.len(), plain.len() + 6);
+    for bar in &all[plain.len()..] {
+        assert!(bar.name.starts_with("rod") && bar.name.len() == 4);
+        let touches = |end: &Vector3<f64>| plain.iter().any(|s| s.ends.contains(end));
+        assert!(bar.ends.iter().all(touches));
+    }
+}
