@@ -111,7 +111,7 @@ class Browser:
         more = {}
         if selector:
             box = self.value(
-                f"(e=>{{const r=e.getBoundingClientRect();return [r.x,r.y,r.width,r.height]}})"
+                f"(e=>{{const r=e.getBoundingClientRect();return [r.x+scrollX,r.y+scrollY,r.width,r.height]}})"
                 f"(document.querySelector({json.dumps(selector)}))"
             )
             more["clip"] = dict(zip(("x", "y", "width", "height"), box), scale=1)
@@ -189,6 +189,17 @@ def play(b):
     b.value("document.activeElement.blur()")
     b.mouse("mouseMoved", 1, 1)
     out["resets"] = same(b, b.picture(".view .stage"), before)
+    # what the pointer is over has a name
+    left, top, wide, high = b.value(
+        "(r=>[r.x,r.y,r.width,r.height])(document.querySelector('.view .stage').getBoundingClientRect())"
+    )
+    names = set()
+    for i in range(1, 16):
+        for k in range(1, 10):
+            b.mouse("mouseMoved", left + wide * i / 16, top + high * k / 10)
+            names.add(b.value("(e=>e.hidden?'':e.textContent)(document.querySelector('.view .name'))"))
+    out["names"] = sorted(names - {""})
+    b.mouse("mouseMoved", 1, 1)
     for box in b.value("[...document.querySelectorAll('.view [type=checkbox]')].map(e=>e.name)"):
         with_it = b.picture(".view .stage")
         b.click(f".view [name={box}]")

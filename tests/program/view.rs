@@ -169,6 +169,11 @@ fn the_view_plays_in_a_browser() {
         ] {
             assert_eq!(seen[fact], true, "{robot}: {fact}: {seen}");
         }
+        let named = list(&seen, "names").iter().filter_map(Value::as_str);
+        assert!(
+            named.clone().any(|n| n.ends_with(" %")),
+            "{robot}: {named:?}"
+        );
         for (key, value) in seen.as_object().expect("facts") {
             assert!(!key.starts_with("box ") || value == true, "{robot}: {key}");
         }

@@ -26,13 +26,13 @@ function column(differences) {
   return differences.map((d) => { sum += d; return sum * UNIT; });
 }
 
-// Points of a closed curve with three more between any two (Catmull and Rom).
+// Points of a closed curve with one more between any two (Catmull and Rom).
 function smooth(points) {
   const n = points.length - 1;
   if (n < 3) return points;
   return points.slice(0, n).flatMap((_, i) => {
     const [p, a, b, q] = [i - 1, i, i + 1, i + 2].map((k) => points[(k + n) % n]);
-    return [0, 0.25, 0.5, 0.75].map((s) => a.map((_, k) => {
+    return [0, 0.5].map((s) => a.map((_, k) => {
       const [d, e] = [0.5 * (b[k] - p[k]), 0.5 * (q[k] - a[k])];
       return a[k] + s * (d + s * (3 * (b[k] - a[k]) - 2 * d - e + s * (d + e - 2 * (b[k] - a[k]))));
     }));
@@ -136,6 +136,10 @@ class Model {
     const own = norm(sub(high, low));
     this.size = own > 0 ? own : 1;
     this.trace.forEach((p) => take(p));
+    for (const o of this.obstacles.filter((o) => o.kind !== 'plane')) {
+      const x = this.solid(o, this.pose(-1));
+      if (norm(x.a) < this.size) [x.a, x.b || x.a].forEach((p) => take(p, x.kind === 'box' ? Math.max(...x.h) : x.r));
+    }
     this.centre = mix(low, high, 0.5);
     this.radius = 0.5 * norm(sub(high, low)) || 1;
     const floors = this.obstacles.filter((o) => o.kind === 'plane' && o.normal[2] > 0.999);

@@ -195,6 +195,7 @@ class View {
       this.waiting = false;
       if (this.playing) {
         const passed = this.last === null ? 0 : Math.min((now - this.last) / 1000, 0.25);
+        if (this.last !== null) this.hurry(now - this.last);
         this.last = now;
         this.t += passed * this.speed;
         if (this.t > this.model.end) this.t = this.model.end > 0 ? this.t % this.model.end : 0;
@@ -204,8 +205,18 @@ class View {
     });
   }
 
+  // Where pictures come too slowly, as without a graphics card, shadows go first, then sharpness.
+  hurry(milliseconds) {
+    this.slow = milliseconds > 90 ? (this.slow || 0) + 1 : 0;
+    if (this.slow < 4 || this.coarse) return;
+    this.slow = 0;
+    this.coarse = this.renderer.frugal === true;
+    this.renderer.frugal = true;
+    this.resize();
+  }
+
   resize() {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    const ratio = Math.min(window.devicePixelRatio || 1, this.coarse ? 0.7 : 2);
     this.width = Math.max(this.stage.clientWidth, 1);
     this.height = Math.max(this.stage.clientHeight, 1);
     this.canvas.width = Math.round(this.width * ratio);

@@ -103,7 +103,7 @@ function program(gl, vertex, fragment) {
 }
 
 // Vertices of seven numbers: point (or normal of the capsule), normal, end.
-function capsuleMesh(round = 28, rows = 8) {
+function capsuleMesh(round = 22, rows = 6) {
   const [data, index] = [[], []];
   for (let i = 0; i <= 2 * rows + 1; i++) {
     const low = i <= rows;
@@ -137,19 +137,20 @@ function boxMesh() {
   return [data, index];
 }
 
-// A tube of six sides along points.
+// A tube of five sides along points.
 function tubeMesh(points, radius) {
   const [data, index] = [[], []];
   points.forEach((p, i) => {
     const before = points[Math.max(i - 1, 0)];
     const after = points[Math.min(i + 1, points.length - 1)];
     const [u, v] = across(unit(sub(after, before)));
-    for (let k = 0; k < 6; k++) {
-      const n = add(mul(u, Math.cos((k * Math.PI) / 3)), mul(v, Math.sin((k * Math.PI) / 3)));
+    for (let k = 0; k < 5; k++) {
+      const turn = (2 * Math.PI * k) / 5;
+      const n = add(mul(u, Math.cos(turn)), mul(v, Math.sin(turn)));
       data.push(...add(p, mul(n, radius)), ...n, 0);
       if (i > 0) {
-        const [a, b] = [6 * i + k, 6 * i + ((k + 1) % 6)];
-        index.push(a - 6, b - 6, b, a - 6, b, a);
+        const [a, b] = [5 * i + k, 5 * i + ((k + 1) % 5)];
+        index.push(a - 5, b - 5, b, a - 5, b, a);
       }
     }
   });
@@ -166,6 +167,7 @@ class WebGL {
     this.body = program(gl, BODY_VERTEX, BODY_FRAGMENT);
     this.grid = program(gl, GRID_VERTEX, GRID_FRAGMENT);
     this.capsule = this.mesh(capsuleMesh());
+    this.rough = this.mesh(capsuleMesh(10, 2));
     this.box = this.mesh(boxMesh());
     const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].flatMap(([x, y]) => [x, y, 0, 0, 0, 1, 0]);
     this.quad = this.mesh([corners, [0, 1, 2, 0, 2, 3]]);
@@ -258,15 +260,15 @@ class WebGL {
     gl.uniform1f(at.thrown, 1);
     gl.uniform1f(at.ground, ground);
     gl.uniform1f(at.plain, 1);
-    gl.uniform4f(at.colour, 0.1, 0.14, 0.18, 0.03);
-    for (const grow of [-1, -0.6, -0.3, 0, 0.3, 0.6, 1, 1.5]) {
-      gl.clear(gl.STENCIL_BUFFER_BIT);
-      gl.stencilFunc(gl.EQUAL, 0, 255);
-      gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+    gl.uniform4f(at.colour, 0.1, 0.14, 0.18, 0.05);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.REPLACE);
+    for (const [layer, grow] of [-1, -0.4, 0.2, 0.8, 1.5].entries()) {
+      gl.stencilFunc(gl.GREATER, layer + 1, 255);
       for (const x of items) {
         const room = x.kind === 'capsule' ? x.r : x.kind === 'box' ? Math.min(...x.h) : 0;
         gl.uniform1f(at.grow, Math.max(grow * spread, -0.7 * room));
-        this.run(this.item(x));
+        const mesh = this.item(x);
+        this.run(mesh === this.capsule ? this.rough : mesh);
       }
     }
     gl.uniform1f(at.grow, 0);
@@ -302,7 +304,7 @@ class WebGL {
     gl.depthMask(false);
     for (const x of scene.grids) this.floor(x, matrix);
     start();
-    if (scene.ground !== null && camera.eye()[2] > scene.ground) {
+    if (!this.frugal && camera.eye()[2] > scene.ground) {
       const thrown = scene.items.filter((x) => x.shadow);
       this.shadows(thrown, scene.ground + 2e-4 * camera.distance, scene.spread);
     }
