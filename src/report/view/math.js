@@ -96,7 +96,7 @@ class Camera {
       const range = (key) => seen.reduce(([a, b], s) => [Math.min(a, s[key]), Math.max(b, s[key])], [Infinity, -Infinity]);
       const [x, y] = [range('x'), range('y')];
       this.pan(0.5 * (width - x[0] - x[1]), 0.5 * (height - y[0] - y[1]), height, width);
-      const filled = Math.max((x[1] - x[0]) / (0.86 * width), (y[1] - y[0]) / (0.84 * height));
+      const filled = Math.max((x[1] - x[0]) / (0.9 * width), (y[1] - y[0]) / (0.88 * height));
       this.distance = clamp(this.distance * clamp(filled, 0.5, 2), 0.5 * this.radius, 20 * this.radius);
     }
   }

@@ -123,12 +123,16 @@ class Model {
         for (const d of r > 0 ? [-r, r] : [0]) this.corners.push(p.map((y, i) => (i === k ? y + d : y)));
       });
     };
+    const around = (x) => {
+      if (x.kind !== 'box') return [x.a, x.b];
+      const signs = [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, i & 2, i & 4].map((bit, k) => (bit ? x.h[k] : -x.h[k])));
+      return signs.map((s) => add(x.a, turn(x.m, s)));
+    };
     take([0, 0, 0]);
     for (let i = 0; i < this.count; i += Math.max(1, Math.floor(this.count / 40))) {
       const when = [i, i, 0];
       for (const x of this.shapes(when)) {
-        const corner = x.kind === 'box' ? norm(x.h) : x.r;
-        [x.a, x.b || x.a].forEach((p) => take(p, corner));
+        around(x).forEach((p) => take(p, x.r));
       }
       this.bodies.forEach((_, b) => take(this.pose(b, when).p));
       this.segments(when).forEach((s) => s.ends.forEach((p) => take(p)));
@@ -138,7 +142,7 @@ class Model {
     this.trace.forEach((p) => take(p));
     for (const o of this.obstacles.filter((o) => o.kind !== 'plane')) {
       const x = this.solid(o, this.pose(-1));
-      if (norm(x.a) < this.size) [x.a, x.b || x.a].forEach((p) => take(p, x.kind === 'box' ? Math.max(...x.h) : x.r));
+      if (norm(x.a) < this.size) around(x).forEach((p) => take(p, x.r));
     }
     this.centre = mix(low, high, 0.5);
     this.radius = 0.5 * norm(sub(high, low)) || 1;
