@@ -35,6 +35,9 @@ impl Search {
         let first = self.next;
         let size = ROUND.0.min(most - first);
         self.next += size;
+        // most random motions touch something and are shrunk until little is left of them
+        let crowded = task.path.is_some_and(|p| !p.postures().is_empty());
+        let candidates = if crowded { 5 * CANDIDATES } else { CANDIDATES };
         let incumbent = self.best.as_ref().map(|(_, b)| b);
         let begun: Vec<Option<(usize, Iterate, bool)>> = (first..first + size)
             .into_par_iter()
@@ -45,7 +48,7 @@ impl Search {
                 // every other start of the later rounds disturbs the best so far
                 let x = match incumbent {
                     Some(b) if number % 2 == 1 => Some(source.disturbed(&b.x, number)),
-                    _ => source.random(number, CANDIDATES, halt),
+                    _ => source.random(number, candidates, halt),
                 };
                 let Some(x) = x else { return Ok(None) };
                 let mut it = Iterate::new(task, x);

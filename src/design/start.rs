@@ -135,7 +135,8 @@ impl Source<'_> {
             let full = basis.parameters(j, &c);
             if centre.is_some() {
                 let still = basis.parameters(j, &constant(c[0], h));
-                let mut factor = rng.random_range(0.6..0.98);
+                // some joints may move little, so that others have room
+                let mut factor = rng.random_range(0.25..0.98);
                 let mut own: Vec<f64>;
                 loop {
                     own = (0..m)
