@@ -245,7 +245,7 @@ fn summary(playback: &Playback, card: &Card) -> String {
         let start: Vec<String> = (0..playback.joints.len())
             .map(|j| format!("{:.4}", playback.samples.q[j][0]))
             .collect();
-        let _ = writeln!(out, "the first point is {}", start.join(", "));
+        let _ = writeln!(out, "the first point, rad or m: {}", start.join(", "));
     }
     out
 }

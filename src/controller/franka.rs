@@ -1,6 +1,7 @@
 //! Franka Control Interface: joint positions at 1 kHz, for a callback of libfranka.
 
-use super::playback::{Column, Playback};
+use super::options::Column;
+use super::playback::Playback;
 use super::{Card, Format, Rates, table};
 use crate::error::Result;
 

@@ -1,6 +1,7 @@
 //! KUKA Fast Robot Interface: joint positions at the send period of the session, which is 1 to 10 ms.
 
-use super::playback::{Column, Playback};
+use super::options::Column;
+use super::playback::Playback;
 use super::{Card, Format, Rates, table};
 use crate::error::Result;
 

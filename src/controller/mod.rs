@@ -18,6 +18,7 @@ mod kuka_rsi;
 mod leg;
 mod mcap;
 mod mujoco;
+mod options;
 mod playback;
 mod ros2;
 mod table;
@@ -29,7 +30,8 @@ mod zip;
 pub use course::{AIM, Channel, Course};
 pub use deviation::{Deviation, Interpolation};
 pub use leg::Leg;
-pub use playback::{Column, Options, Playback, Unit};
+pub use options::{Column, Options, Unit};
+pub use playback::Playback;
 
 use crate::error::{Error, Result};
 

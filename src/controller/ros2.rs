@@ -5,7 +5,8 @@
 
 use super::cdr::{Cdr, SCHEMA, split};
 use super::mcap;
-use super::playback::{Column, Playback};
+use super::options::Column;
+use super::playback::Playback;
 use super::text::{exact, list, plain, quoted};
 use super::{Card, Choice, Format};
 use crate::error::{Error, Result};

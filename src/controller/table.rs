@@ -1,6 +1,7 @@
 //! Tables of numbers: the plain CSV, and those of controllers that read one.
 
-use super::playback::{Column, Playback};
+use super::options::Column;
+use super::playback::Playback;
 use super::{Card, Choice, Format};
 use crate::error::{Error, Result};
 use crate::trajectory::samples::Line;
