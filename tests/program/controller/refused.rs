@@ -57,7 +57,7 @@ fn options_that_make_no_sense() {
     let argument = |line: &str, words: &[&str]| fails(&folder, &panda, line, 2, words);
     argument("--format abb", &["abb", "urscript"]);
     argument("--format franka --rate 500", &["franka", "1000 Hz", "500"]);
-    argument("--format csv --rate -3", &["--rate"]);
+    argument("--format csv --rate 0", &["--rate"]);
     argument("--format csv --rate 1e9", &["--rate"]);
     argument("--format csv --columns t", &["positions (q)"]);
     argument("--format csv --columns q,q", &["twice"]);
