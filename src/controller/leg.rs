@@ -12,6 +12,9 @@ use std::path::Path;
 /// Below this step, s, differences of positions are rounding: straight lines between the states take their place.
 const SHORT: f64 = 1e-4;
 
+/// Position, velocity or acceleration that no robot has.
+const HUGE: f64 = 1e12;
+
 /// A sampled move of the joints (of the actuators of a parallel robot), in the order of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Leg {
@@ -22,7 +25,8 @@ impl Leg {
     /// A leg from its samples; the first one is at its time zero.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there are fewer than two samples, the times do not increase, or columns differ in length.
+    /// [`Error::Argument`] if there are fewer than two samples, the times do not increase, columns differ in length, or a
+    /// number is one that no robot has.
     pub fn new(mut samples: Samples) -> Result<Self> {
         let n = samples.len();
         if n < 2 {
@@ -45,6 +49,22 @@ impl Leg {
                 samples.t[i],
                 samples.t[i - 1]
             )));
+        }
+        for (name, columns) in [
+            ("q", &samples.q),
+            ("dq", &samples.qd),
+            ("ddq", &samples.qdd),
+        ] {
+            for (j, column) in columns.iter().enumerate() {
+                if let Some(i) = column.iter().position(|x| !(x.abs() < HUGE)) {
+                    return Err(Error::Argument(format!(
+                        "{name}{} is {:e} in sample {}; rad or m and seconds are expected",
+                        j + 1,
+                        column[i],
+                        i + 1
+                    )));
+                }
+            }
         }
         let start = samples.t[0];
         samples.t.iter_mut().for_each(|t| *t -= start);

@@ -8,8 +8,9 @@ use crate::error::{Error, Result, Warning, WarningKind};
 use crate::trajectory::samples::times;
 use crate::trajectory::{Fourier, Samples};
 
-/// Most numbers of a playback: more do not fit the memory of a small computer.
-const MOST: usize = 200_000_000;
+/// Most numbers of a playback, some twenty minutes of seven joints at 1 kHz: their text fits the memory of a small
+/// computer.
+const MOST: usize = 30_000_000;
 
 /// All that a format writes.
 #[derive(Debug, Clone)]
@@ -97,13 +98,17 @@ impl Playback {
                         course.joints().len()
                     )));
                 }
-                let all = course.sample(&times)?;
-                let pick =
-                    |columns: &[Vec<f64>]| order.iter().map(|&j| columns[j].clone()).collect();
+                let mut all = course.sample(&times)?;
+                let pick = |columns: &mut [Vec<f64>]| -> Vec<Vec<f64>> {
+                    order
+                        .iter()
+                        .map(|&j| std::mem::take(&mut columns[j]))
+                        .collect()
+                };
                 let samples = Samples {
-                    q: pick(&all.q),
-                    qd: pick(&all.qd),
-                    qdd: pick(&all.qdd),
+                    q: pick(&mut all.q),
+                    qd: pick(&mut all.qd),
+                    qdd: pick(&mut all.qdd),
                     t: all.t,
                 };
                 let mut deviations = Vec::new();
