@@ -15,6 +15,9 @@ const SHORT: f64 = 1e-4;
 /// Position, velocity or acceleration that no robot has.
 const HUGE: f64 = 1e12;
 
+/// By how much a step may differ from what its velocities say, rad or m: rounding, jumps of the jerk.
+const JUMP: f64 = 1e-3;
+
 /// A sampled move of the joints (of the actuators of a parallel robot), in the order of the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Leg {
@@ -25,8 +28,8 @@ impl Leg {
     /// A leg from its samples; the first one is at its time zero.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there are fewer than two samples, the times do not increase, columns differ in length, or a
-    /// number is one that no robot has.
+    /// [`Error::Argument`] if there are fewer than two samples, the times do not increase, columns differ in length, a
+    /// number is one that no robot has, or positions jump.
     pub fn new(mut samples: Samples) -> Result<Self> {
         let n = samples.len();
         if n < 2 {
@@ -62,6 +65,28 @@ impl Leg {
                         j + 1,
                         column[i],
                         i + 1
+                    )));
+                }
+            }
+        }
+        for j in 0..samples.q.len() {
+            for i in 1..n {
+                // Euler-Maclaurin: exact for a polynomial of degree four
+                let at = |c: &[Vec<f64>], i: usize| c[j][i];
+                let (q, v, a) = (&samples.q, &samples.qd, &samples.qdd);
+                let h = samples.t[i] - samples.t[i - 1];
+                let way = 0.5 * h * (at(v, i - 1) + at(v, i));
+                let way = way + h * h / 12.0 * (at(a, i - 1) - at(a, i));
+                let off = at(q, i) - at(q, i - 1) - way;
+                let speed = at(v, i - 1).abs() + at(v, i).abs();
+                if off.abs() > JUMP + 0.1 * h * speed {
+                    return Err(Error::Argument(format!(
+                        "q{} jumps between samples {i} and {}: by {off:.2e} more than dq{} and ddq{} say; \
+                         they must be its derivatives by time in s",
+                        j + 1,
+                        i + 1,
+                        j + 1,
+                        j + 1
                     )));
                 }
             }
@@ -226,6 +251,15 @@ mod tests {
             "{message}"
         );
         one.t[1] = 1.0;
+        one.q[0][1] = 0.1;
+        let message = Leg::new(one.clone()).unwrap_err().to_string();
+        assert!(
+            message.contains("q1 jumps between samples 1 and 2"),
+            "{message}"
+        );
+        one.q[0][1] = 1e300;
+        let message = Leg::new(one.clone()).unwrap_err().to_string();
+        assert!(message.contains("q1 is 1e300 in sample 2"), "{message}");
         one.q[0].pop();
         assert!(Leg::new(one).is_err());
     }

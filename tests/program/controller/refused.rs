@@ -178,27 +178,20 @@ fn files_that_are_none() {
             &["broken.json", word],
         );
     }
-    // a move to another place, and one that stands still in time
+    // a move to another place, one that stands still in time, and one that jumps
     let header = "t,q1,q2,dq1,dq2,ddq1,ddq2\n";
     let planar = designed("planar2");
-    move_(&format!("{header}0,0,0,0,0,0,0\n1,9,9,0,0,0,0\n"));
-    let words = ["broken.json", "joint1", "9"];
-    fails(
-        &folder,
-        &planar,
-        "--format csv --approach broken.json",
-        1,
-        &words,
-    );
-    move_(&format!("{header}1,0,0,0,0,0,0\n1,9,9,0,0,0,0\n"));
-    let words = ["broken.json", "does not increase"];
-    fails(
-        &folder,
-        &planar,
-        "--format csv --return broken.json",
-        1,
-        &words,
-    );
+    for (rows, word) in [
+        ("0,9,9,0,0,0,0\n1,9,9,0,0,0,0\n", "joint1"),
+        ("1,9,9,0,0,0,0\n1,9,9,0,0,0,0\n", "does not increase"),
+        ("0,0,0,0,0,0,0\n1,9,9,0,0,0,0\n", "q1 jumps"),
+    ] {
+        move_(&format!("{header}{rows}"));
+        for option in ["approach", "return"] {
+            let line = format!("--format csv --{option} broken.json");
+            fails(&folder, &planar, &line, 1, &["broken.json", word]);
+        }
+    }
 }
 
 #[test]
