@@ -59,7 +59,7 @@ impl Leg {
             ("ddq", &samples.qdd),
         ] {
             for (j, column) in columns.iter().enumerate() {
-                if let Some(i) = column.iter().position(|x| !(x.abs() < HUGE)) {
+                if let Some(i) = column.iter().position(|x| x.is_nan() || x.abs() >= HUGE) {
                     return Err(Error::Argument(format!(
                         "{name}{} is {:e} in sample {}; rad or m and seconds are expected",
                         j + 1,
