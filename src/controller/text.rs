@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn names_end_no_comment_and_no_line() {
-        assert_eq!(plain("a*/\nb \"ç\""), "a_/_b _c_");
+        assert_eq!(plain("a*/\nb \"ç\""), "a_/_b ___");
         assert_eq!(identifier("7 Axes-B"), "robot_7_axes_b");
         assert_eq!(quoted("a\"\n"), "\"a\\\"\\n\"");
     }
