@@ -9,6 +9,7 @@
 //! | [`identification`] | from a log to a model |
 //! | [`load`] | mass, centre of mass and inertia of a load |
 //! | [`simulation`] | the simulated robot |
+//! | [`run`] | files for controllers, and the programs that play them |
 //! | [`diagnosis`] | how to read a diagnosis, and what to do next |
 //! | [`diagnosis_method`] | how the diagnosis works, with its equations, constants and catalogue |
 //! | [`diagnosis_results`] | what the diagnosis found on rehearsals and real robots |
@@ -36,6 +37,7 @@ macro_rules! documents {
             #[doc = "[notation.md]: crate::documentation::notation"]
             #[doc = "[parallel.md]: crate::documentation::parallel"]
             #[doc = "[results.md]: crate::documentation::results"]
+            #[doc = "[run.md]: crate::documentation::run"]
             #[doc = "[simulation.md]: crate::documentation::simulation"]
             #[doc = "[withheld.md]: crate::documentation::withheld"]
             #[doc = ""]
@@ -60,6 +62,7 @@ documents! {
     notation "notation"
     parallel "parallel"
     results "results"
+    run "run"
     simulation "simulation"
     withheld "withheld"
 }

@@ -189,6 +189,12 @@ warning_kinds! {
     FrictionChattered = "friction_chattered",
     /// A result file could not be written; the values stand in another one.
     FileNotWritten = "file_not_written",
+    /// A motion starts or ends while a joint moves; a controller cannot play it from rest.
+    MovingEnds = "moving_ends",
+    /// Between two points a controller may leave the motion by more than is aimed at.
+    RateCoarse = "rate_coarse",
+    /// Joints of a motion are not in the file for the controller.
+    JointsLeftOut = "joints_left_out",
 }
 
 /// Something imperfect that did not stop the work: it is printed and carried to the report.

@@ -65,6 +65,8 @@ pub mod base;
 pub mod collision;
 #[doc(hidden)]
 pub mod conic;
+#[doc(hidden)]
+pub mod controller;
 pub mod design;
 pub mod diagnose;
 pub mod documentation;

@@ -3,6 +3,7 @@
 
 mod design;
 mod diagnose;
+mod export;
 mod identifiability;
 mod identify;
 mod load;
@@ -41,6 +42,7 @@ enum Command {
     Torque(torque::Args),
     Diagnose(diagnose::Args),
     Simulate(simulate::Args),
+    Export(export::Args),
     Load(load::Args),
     Robots(robots::Args),
     New(new::Args),
@@ -56,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Torque(a) => torque::run(a),
         Command::Diagnose(a) => diagnose::run(a),
         Command::Simulate(a) => simulate::run(a),
+        Command::Export(a) => export::run(a),
         Command::Load(a) => load::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),

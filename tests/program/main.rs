@@ -4,6 +4,7 @@
 mod common;
 
 mod cli;
+mod controller;
 mod dependencies;
 mod documents;
 mod mutations;

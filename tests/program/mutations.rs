@@ -95,9 +95,17 @@ const TARGETS: [(&str, &[&str]); 16] = [
         &[
             "identifiability arm.toml trajectory.json --output o --force",
             "simulate arm.toml trajectory.json --rate 50 --step 1e-3 --output s.csv --force",
+            "export trajectory.json --format ros2-mcap --output e.mcap --force",
+            "export trajectory.json --format csv --robot arm.toml --unit deg --output e.csv --force",
         ],
     ),
-    ("samples.csv", &["torque arm.toml samples.csv"]),
+    (
+        "samples.csv",
+        &[
+            "torque arm.toml samples.csv",
+            "export trajectory.json --format ros2 --approach samples.csv --output e.yaml --force",
+        ],
+    ),
     ("platform.csv", &["torque delta.toml platform.csv"]),
     (
         "delta.toml",
@@ -129,6 +137,7 @@ const TARGETS: [(&str, &[&str]); 16] = [
         &[
             "identifiability delta.toml platform.json --output o --force",
             "simulate delta.toml platform.json --rate 50 --step 1e-3 --output s.csv --force",
+            "export platform.json --format csv --robot delta.toml --output e.csv --force",
         ],
     ),
     (

@@ -1,0 +1,251 @@
+//! `excite export TRAJECTORY --format …`.
+
+use super::{print, warn};
+use excite::controller::{Card, Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
+use excite::mechanism::bundled as parallel;
+use excite::output::write_atomic;
+use excite::robot::{Motion, bundled};
+use excite::trajectory::Trajectory;
+use excite::{Error, Plant, Result};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Write a trajectory in a file that the robot's controller reads.
+#[derive(clap::Args)]
+#[command(
+    long_about = "Write a trajectory in a file that the robot's controller reads: ROS 2, Universal Robots, Franka, \
+                  KUKA, xArm, MuJoCo, plain CSV or C (--list). docs/run.md has the program that plays each of \
+                  them.\n\nBetween two points a controller interpolates. How far it may leave the trajectory there \
+                  is bounded and printed. Without --rate the lowest rate of the controller is taken that keeps \
+                  within 1e-5 rad or m, or within one step of the encoder.\n\nThe first run should be slow: --speed \
+                  0.1 plays the same path at a tenth of the speed. Formats that are sent point by point need a \
+                  motion that starts and ends at rest, or moves there and back (--approach, --return: CSV files \
+                  with the columns t, q1 …, dq1 …, ddq1 … of the actuators).",
+    after_help = "Examples:\n  excite export out/trajectory.json --format urscript --speed 0.1\n  excite export \
+                  out/trajectory.json --format ros2 --approach moves/approach.csv --return moves/return.csv\n  excite \
+                  export out/trajectory.json --format csv --robot arm.urdf --rate 200 --unit deg --columns t,q\n  excite \
+                  export --list"
+)]
+pub struct Args {
+    /// trajectory.json of `excite design`
+    #[arg(required_unless_present = "list")]
+    trajectory: Option<PathBuf>,
+    /// Format of the file, one of --list
+    #[arg(short, long, value_name = "NAME", required_unless_present = "list")]
+    format: Option<String>,
+    /// Print the formats
+    #[arg(long)]
+    list: bool,
+    /// Bundled robot, robot.toml or URDF: needed for the motion of a platform and for --unit [default:
+    /// the bundled robot that the trajectory was designed for]
+    #[arg(long)]
+    robot: Option<String>,
+    /// Samples a second, Hz [default: chosen so that the deviation is small enough]
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Periods of the motion [default: as in the trajectory]
+    #[arg(long, value_name = "N")]
+    periods: Option<u32>,
+    /// Fraction of the speed of the design
+    #[arg(long, value_name = "FRACTION", default_value_t = 1.0)]
+    speed: f64,
+    /// Move to the start, played first
+    #[arg(long, value_name = "FILE.csv")]
+    approach: Option<PathBuf>,
+    /// Move back, played last
+    #[arg(long = "return", value_name = "FILE.csv")]
+    retreat: Option<PathBuf>,
+    /// Joints by name, in the order of the controller [default: all, as in the robot]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    joints: Option<Vec<String>>,
+    /// Columns of csv (t, q, dq, ddq), or what points of ros2 have (q, dq, ddq)
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    columns: Option<Vec<String>>,
+    /// Units of csv: rad or deg, m or mm
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    unit: Vec<String>,
+    /// Begin the program with a slow move to the start (urscript, xarm); nobody looks for obstacles
+    #[arg(long)]
+    move_to_start: bool,
+    /// File to write [default: TRAJECTORY_FORMAT.EXTENSION beside the trajectory]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+}
+
+pub fn run(args: Args) -> Result<()> {
+    let (Some(path), Some(name), false) = (&args.trajectory, &args.format, args.list) else {
+        return print(&list());
+    };
+    let format = format(name)?;
+    let options = Options {
+        rate: args.rate,
+        joints: args.joints.clone(),
+        columns: match &args.columns {
+            None => None,
+            Some(names) => Some(
+                names
+                    .iter()
+                    .map(|n| Column::parse(n))
+                    .collect::<Result<_>>()?,
+            ),
+        },
+        units: args
+            .unit
+            .iter()
+            .map(|u| Unit::parse(u))
+            .collect::<Result<_>>()?,
+        move_to_start: args.move_to_start,
+    };
+    let trajectory = Trajectory::read(path)?;
+    // what cannot be done is about the trajectory; what is asked for wrongly is about the options
+    let about = |e: Error| match e {
+        Error::Infeasible(message) => Error::file(path, "", message),
+        other => other,
+    };
+    let plant = robot(args.robot.as_deref(), &trajectory, path)?;
+    let periods = args.periods.unwrap_or(trajectory.periods);
+    let mut course =
+        Course::new(&trajectory, plant.as_ref(), periods, args.speed).map_err(about)?;
+    for (file, first) in [(&args.approach, true), (&args.retreat, false)] {
+        let Some(file) = file else { continue };
+        let leg = Leg::read(file, course.joints().len())?.at_speed(args.speed);
+        let joined = match first {
+            true => course.after(leg),
+            false => course.before(leg),
+        };
+        course = joined.map_err(|e| Error::file(file, "", e.to_string()))?;
+    }
+    let playback = Playback::new(&course, format, &options).map_err(about)?;
+    warn(&playback.warnings);
+    let bytes = format.write(&playback).map_err(about)?;
+    let card = format.card();
+    let output = args.output.clone().unwrap_or_else(|| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.with_file_name(format!(
+            "{stem}_{}.{}",
+            card.name.replace('-', "_"),
+            card.extension
+        ))
+    });
+    let mut files = vec![(output.clone(), bytes)];
+    if let Some((suffix, text)) = format.beside(&playback) {
+        let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+        let beside = output.with_file_name(format!("{stem}{suffix}"));
+        files.push((beside, text.into_bytes()));
+    }
+    if let Some((file, _)) = files.iter().find(|(file, _)| !args.force && file.is_file()) {
+        return Err(Error::Exists(file.clone()));
+    }
+    if let Some(folder) = output.parent().filter(|f| !f.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
+    }
+    let mut out = summary(&playback, &card);
+    for (file, bytes) in &files {
+        write_atomic(file, args.force, |w| w.write_all(bytes))?;
+        let _ = writeln!(out, "wrote {} ({} bytes)", file.display(), bytes.len());
+    }
+    print(&out)
+}
+
+/// The robot that is named; otherwise the bundled one that the trajectory was designed for.
+fn robot(spec: Option<&str>, trajectory: &Trajectory, path: &Path) -> Result<Option<Plant>> {
+    let name = trajectory.robot.as_str();
+    let known = bundled::find(name).is_some() || parallel::find(name).is_some();
+    let plant = match spec {
+        Some(spec) => Plant::load(spec)?,
+        None if known => Plant::load(name)?,
+        None => return Ok(None),
+    };
+    let plant = plant
+        .in_space(trajectory.space)
+        .map_err(|e| Error::file(path, "coordinates", e.to_string()));
+    let matched = plant.and_then(|plant| match trajectory.matches(plant.moved()) {
+        Ok(warning) => Ok((plant, warning)),
+        Err(e) => Err(Error::file(path, "", e.to_string())),
+    });
+    match (spec, matched) {
+        (Some(_), Ok((plant, warning))) => {
+            warn(plant.warnings());
+            warn(&warning.into_iter().collect::<Vec<_>>());
+            Ok(Some(plant))
+        }
+        (Some(_), Err(e)) => Err(e),
+        // another robot of the same name is not the one that is meant
+        (None, Ok((plant, None))) => Ok(Some(plant)),
+        (None, _) => Ok(None),
+    }
+}
+
+fn list() -> String {
+    let mut out = String::new();
+    for format in FORMATS {
+        let card = format.card();
+        let _ = writeln!(out, "{:<10} {}", card.name, card.about);
+    }
+    out
+}
+
+/// What will run: parts, samples, and what happens between them.
+fn summary(playback: &Playback, card: &Card) -> String {
+    let mut out = String::new();
+    let _ = write!(out, "{}: {}, ", playback.robot, card.name);
+    let _ = match card.rates.offered.is_empty() {
+        true => writeln!(
+            out,
+            "series of {} coordinates, {} s",
+            playback.fourier.dof(),
+            playback.duration()
+        ),
+        false => writeln!(
+            out,
+            "{} joints, {} samples at {} Hz, {} s",
+            playback.joints.len(),
+            playback.len(),
+            playback.rate,
+            playback.duration()
+        ),
+    };
+    let [approach, motion, retreat] = playback.parts;
+    if approach + retreat > 0.0 {
+        let _ = writeln!(
+            out,
+            "approach {approach} s, motion {motion} s, return {retreat} s"
+        );
+    }
+    for (way, all) in &playback.deviations {
+        // of joints that turn and joints that slide, the worst of each
+        for motion in [Motion::Revolute, Motion::Prismatic] {
+            let of = playback.joints.iter().zip(all);
+            let of = of.filter(|(c, _)| c.motion.unwrap_or(Motion::Revolute) == motion);
+            let Some((joint, worst)) = of.max_by(|a, b| a.1.value.total_cmp(&b.1.value)) else {
+                continue;
+            };
+            let unit = match motion {
+                Motion::Revolute => "rad",
+                Motion::Prismatic => "m",
+            };
+            let proof = match worst.proven {
+                true => "at most",
+                false => "about, not proven,",
+            };
+            let _ = writeln!(
+                out,
+                "between the points, {}: {proof} {:.2e} {unit} off ({}; {})",
+                way.name(),
+                worst.value,
+                joint.name,
+                way.formula()
+            );
+        }
+    }
+    if !playback.is_empty() {
+        let start: Vec<String> = (0..playback.joints.len())
+            .map(|j| format!("{:.4}", playback.samples.q[j][0]))
+            .collect();
+        let _ = writeln!(out, "the first point, rad or m: {}", start.join(", "));
+    }
+    out
+}
