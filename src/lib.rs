@@ -35,6 +35,7 @@
 //! | either | [`plant`] | serial and parallel robots as one |
 //! | base | [`base`] | base parameters, rank, what cannot be identified and why |
 //! | trajectory | [`trajectory`] | Fourier series, exact extrema, certificates, files |
+//! | moves | [`moves`] | the way to the start and back; a motion at several speeds |
 //! | design | [`design`] | the optimiser |
 //! | before the run | [`identifiability`] | which parameters the run will identify, and how well |
 //! | rehearsal | [`simulate`] | a log as the robot would write it |
@@ -78,6 +79,7 @@ pub mod identify;
 pub mod load;
 pub mod log;
 pub mod mechanism;
+pub mod moves;
 #[doc(hidden)]
 pub mod output;
 pub mod plant;

@@ -7,7 +7,9 @@ mod export;
 mod identifiability;
 mod identify;
 mod load;
+mod moves;
 mod new;
+mod rehearse;
 mod robots;
 mod simulate;
 mod summary;
@@ -41,6 +43,8 @@ enum Command {
     Identify(identify::Args),
     Torque(torque::Args),
     Diagnose(diagnose::Args),
+    Move(moves::Args),
+    Rehearse(rehearse::Args),
     Simulate(simulate::Args),
     Export(export::Args),
     Load(load::Args),
@@ -57,6 +61,8 @@ pub fn main() -> ExitCode {
         Command::Identify(a) => identify::run(a),
         Command::Torque(a) => torque::run(a),
         Command::Diagnose(a) => diagnose::run(a),
+        Command::Move(a) => moves::run(a),
+        Command::Rehearse(a) => rehearse::run(a),
         Command::Simulate(a) => simulate::run(a),
         Command::Export(a) => export::run(a),
         Command::Load(a) => load::run(a),

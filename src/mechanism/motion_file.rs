@@ -11,7 +11,7 @@ use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::output::write_atomic;
 use crate::trajectory::Fourier;
-use crate::trajectory::samples::{Line, column_names, read_columns, read_samples, times};
+use crate::trajectory::samples::{Line, StateFn, column_names, read_columns, read_samples, times};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
@@ -37,6 +37,22 @@ impl Mechanism {
         rate: f64,
     ) -> Result<usize> {
         let times = times(trajectory.period * f64::from(periods), rate)?;
+        let at = |t: f64, out: [&mut [f64]; 3]| trajectory.evaluate(t, out);
+        self.write_along(path, force, &times, &at)?;
+        Ok(times.len())
+    }
+
+    /// Writes any motion of the task coordinates at these times, as [`Mechanism::write_motion`] does.
+    ///
+    /// # Errors
+    /// As [`Mechanism::write_motion`].
+    pub fn write_along(
+        &self,
+        path: impl AsRef<Path>,
+        force: bool,
+        times: &[f64],
+        along: &StateFn,
+    ) -> Result<()> {
         let (m, na) = (self.freedoms(), self.actuators());
         let mut header = vec!["t".to_string()];
         for name in ["q", "dq", "ddq", "tau"] {
@@ -62,7 +78,7 @@ impl Mechanism {
             for (s, &t) in times.iter().enumerate() {
                 let (q, rest) = state.split_at_mut(m);
                 let (qd, qdd) = rest.split_at_mut(m);
-                trajectory.evaluate(t, [q, qd, qdd]);
+                along(t, [q, qd, qdd]);
                 for k in 0..m {
                     x.q[k * n + s] = state[k];
                     x.qd[k * n + s] = state[m + k];
@@ -102,8 +118,7 @@ impl Mechanism {
                 line.row(w, row[0], row[1..].iter().copied())?;
             }
             Ok(())
-        })?;
-        Ok(times.len())
+        })
     }
 
     /// Times and motion of the task coordinates of a CSV file. Columns may stand in any order;

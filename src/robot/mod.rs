@@ -187,6 +187,10 @@ pub struct Joint {
     /// areas of a pneumatic or hydraulic piston, m²: of chamber a, which extends the joint, and of
     /// chamber b
     pub piston: Option<[f64; 2]>,
+    /// root mean square torque that it bears for ever, N m or N
+    pub continuous_torque: Option<f64>,
+    /// mean mechanical power that it bears for ever, W
+    pub continuous_power: Option<f64>,
     /// values of armature, viscous, Coulomb and offset in the nominal model, in
     /// [`JointTerm::ALL`] order; always part of the torque
     pub terms: [f64; 4],
@@ -214,6 +218,8 @@ impl Joint {
             position_resolution: None,
             gear_ratio: None,
             piston: None,
+            continuous_torque: None,
+            continuous_power: None,
             terms: [0.0; 4],
             identify: [false; 4],
         }

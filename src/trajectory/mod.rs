@@ -3,8 +3,8 @@
 //! A motion is a [`Fourier`] series per joint over one shared list of harmonics, so it is smooth,
 //! repeats for ever, and all its derivatives are known in closed form. From here come the
 //! parametrisation an optimiser works in ([`Basis`]), the exact extrema over all time
-//! ([`mod@extrema`]), the proof that a robot's limits hold ([`certificate`], `torque`), the
-//! files (`file`, [`samples`]) and the moves to and from the start ([`transition`]).
+//! ([`mod@extrema`]), the proof that a robot's limits hold ([`certificate`], `torque`) and the
+//! files (`file`, [`samples`]).
 
 pub(crate) mod basis;
 #[doc(hidden)]
@@ -21,8 +21,6 @@ pub mod jets;
 pub mod samples;
 pub(crate) mod table;
 pub(crate) mod torque;
-#[doc(hidden)]
-pub mod transition;
 
 #[doc(hidden)]
 pub use basis::Basis;

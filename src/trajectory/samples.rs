@@ -149,24 +149,72 @@ pub fn write_samples(
     torque: Option<&TorqueFn>,
 ) -> Result<usize> {
     let times = times(trajectory.period * f64::from(periods), rate)?;
-    let n = trajectory.dof();
+    let at = |t: f64, out: [&mut [f64]; 3]| trajectory.evaluate(t, out);
+    write_along(path, force, trajectory.dof(), &times, &at, torque)?;
+    Ok(times.len())
+}
+
+/// Positions, velocities and accelerations at a time.
+pub type StateFn<'a> = dyn Fn(f64, [&mut [f64]; 3]) + 'a;
+
+/// Writes any motion of `dof` joints at these times, as [`write_samples`] does.
+///
+/// # Errors
+/// As [`write_atomic`]; [`Error::Io`] if a number is not finite.
+pub fn write_along(
+    path: impl AsRef<Path>,
+    force: bool,
+    dof: usize,
+    times: &[f64],
+    at: &StateFn,
+    torque: Option<&TorqueFn>,
+) -> Result<()> {
+    write_atomic(path, force, |w| along(w, dof, times, at, torque))
+}
+
+/// Bytes of a trajectory as CSV at these times, without torques.
+///
+/// # Errors
+/// [`Error::Argument`] if a number is not finite.
+pub fn length_of_samples(trajectory: &Fourier, times: &[f64]) -> Result<usize> {
+    struct Count(usize);
+    impl Write for Count {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0 += bytes.len();
+            Ok(bytes.len())
+        }
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+    let mut count = Count(0);
+    let at = |t: f64, out: [&mut [f64]; 3]| trajectory.evaluate(t, out);
+    along(&mut count, trajectory.dof(), times, &at, None)
+        .map_err(|e| Error::Argument(e.to_string()))?;
+    Ok(count.0)
+}
+
+fn along(
+    w: &mut dyn Write,
+    n: usize,
+    times: &[f64],
+    at: &StateFn,
+    torque: Option<&TorqueFn>,
+) -> io::Result<()> {
     let mut values = vec![0.0; if torque.is_some() { 4 * n } else { 3 * n }];
     let mut line = Line::default();
-    write_atomic(path, force, |w| {
-        line.header(w, n, torque.is_some())?;
-        for &t in &times {
-            let (q, rest) = values.split_at_mut(n);
-            let (qd, rest) = rest.split_at_mut(n);
-            let (qdd, tau) = rest.split_at_mut(n);
-            trajectory.evaluate(t, [&mut *q, &mut *qd, &mut *qdd]);
-            if let Some(torque) = torque {
-                torque(q, qd, qdd, tau);
-            }
-            line.row(w, t, values.iter().copied())?;
+    line.header(w, n, torque.is_some())?;
+    for &t in times {
+        let (q, rest) = values.split_at_mut(n);
+        let (qd, rest) = rest.split_at_mut(n);
+        let (qdd, tau) = rest.split_at_mut(n);
+        at(t, [&mut *q, &mut *qd, &mut *qdd]);
+        if let Some(torque) = torque {
+            torque(q, qd, qdd, tau);
         }
-        Ok(())
-    })?;
-    Ok(times.len())
+        line.row(w, t, values.iter().copied())?;
+    }
+    Ok(())
 }
 
 /// A line being put together, its memory kept.

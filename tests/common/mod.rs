@@ -54,6 +54,8 @@ pub fn joint(name: &str, motion: Motion) -> Joint {
         position_resolution: None,
         gear_ratio: None,
         piston: None,
+        continuous_torque: None,
+        continuous_power: None,
         terms: [0.0; 4],
         identify: [false; 4],
     }

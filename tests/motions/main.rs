@@ -1,8 +1,9 @@
-//! Designed motions: the optimiser, its cone solver, and the proof of limits.
+//! Designed motions: the optimiser, its cone solver, the proof of limits, and the moves to them.
 
 #[path = "../common/mod.rs"]
 mod common;
 
 mod conic;
 mod design;
+mod moves;
 mod trajectory;

@@ -1,9 +1,8 @@
-//! Trajectories against whole robots: limits, torque bounds, moves to and from the start.
+//! Trajectories against whole robots: limits and torque bounds.
 
 use excite::robot::{Body, Inertia, Joint, Limits, Motion, Prior, Robot};
 use excite::trajectory::certificate::Kind;
 use excite::trajectory::jets::{Jet, Norms};
-use excite::trajectory::transition::{State, approach, retreat, transition};
 use excite::trajectory::{Basis, Ends, Fourier, Grid, Series, certify, torque_certificate};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use proptest::prelude::*;
@@ -20,6 +19,8 @@ fn joint(name: &str, motion: Motion, limits: Limits) -> Joint {
         position_resolution: None,
         gear_ratio: None,
         piston: None,
+        continuous_torque: None,
+        continuous_power: None,
         terms: [0.0; 4],
         identify: [false; 4],
     }
@@ -483,113 +484,4 @@ fn a_trajectory_of_another_robot_or_a_torque_that_is_no_number() {
     let nan = |_: &[f64], _: &[f64], _: &[f64], tau: &mut [f64]| tau.fill(f64::NAN);
     let error = torque_certificate(&robot, &random_motion(1, 7, 1.0, false), 100, &nan);
     assert!(error.unwrap_err().to_string().contains("joint1"));
-}
-
-/// Largest magnitudes of the samples' velocities and accelerations over the limits, and whether
-/// positions, velocities and accelerations belong together.
-fn check_move(robot: &Robot, m: &excite::trajectory::transition::Transition) {
-    let s = &m.samples;
-    assert_eq!(s.t[s.len() - 1], m.duration);
-    for (j, joint) in robot.joints.iter().enumerate() {
-        let l = joint.limits;
-        for i in 0..s.len() {
-            let (q, v, a) = (s.q[j][i], s.qd[j][i], s.qdd[j][i]);
-            assert!(q >= l.position[0] - 1e-9 && q <= l.position[1] + 1e-9);
-            assert!(v.abs() <= l.velocity * (1.0 + 1e-9));
-            assert!(a.abs() <= l.acceleration * (1.0 + 1e-9));
-            if i > 0 {
-                let h = s.t[i] - s.t[i - 1];
-                let jerk = (a - s.qdd[j][i - 1]).abs() / h.max(1e-9);
-                assert!(jerk <= l.jerk * (1.0 + 1e-6), "{jerk}");
-                // trapezoid is exact to h³ jerk / 12
-                let step = 0.5 * h * (v + s.qd[j][i - 1]);
-                assert!((q - s.q[j][i - 1] - step).abs() <= 0.25 * h.powi(3) * l.jerk + 1e-12);
-            }
-        }
-    }
-}
-
-#[test]
-fn moves_to_and_from_the_start_keep_the_limits() {
-    let robot = arm();
-    let home = [0.0, -0.5, 0.3, -1.2, 0.0, 1.5, 0.7];
-    for seed in 0..30 {
-        let f = random_motion(seed, 7, 1.0, false);
-        let start = State::start_of(&f);
-        let there = approach(&robot, &home, &f, 500.0).unwrap();
-        check_move(&robot, &there);
-        let back = retreat(&robot, &f, &home, 500.0).unwrap();
-        check_move(&robot, &back);
-        for (m, first, last) in [
-            (&there, &home[..], &start.q[..]),
-            (&back, &start.q[..], &home[..]),
-        ] {
-            let end = m.samples.len() - 1;
-            for j in 0..7 {
-                let column = &m.samples.q[j];
-                assert!(
-                    (column[0] - first[j]).abs() < 1e-12 && (column[end] - last[j]).abs() < 1e-9
-                );
-                assert!(m.samples.qd[j][0].abs() < 1e-9 && m.samples.qd[j][end].abs() < 1e-9);
-            }
-            assert!(m.duration > 0.0 && m.warnings.is_empty());
-        }
-    }
-}
-
-#[test]
-fn moves_to_a_moving_start() {
-    let robot = arm();
-    let basis = Basis::new(&[1, 2], Ends::Free, 7, None).unwrap();
-    let x: Vec<f64> = (0..basis.len())
-        .map(|k| 0.2 * ((k * k) as f64).sin())
-        .collect();
-    let f = basis.fourier(3.0, &x);
-    let start = State::start_of(&f);
-    assert!(start.qd.iter().all(|v| v.abs() > 1e-4));
-    let there = approach(&robot, &[0.0; 7], &f, 1000.0).unwrap();
-    check_move(&robot, &there);
-    let end = there.samples.len() - 1;
-    for j in 0..7 {
-        assert!((there.samples.q[j][end] - start.q[j]).abs() < 1e-8);
-        assert!((there.samples.qd[j][end] - start.qd[j]).abs() < 1e-8);
-        assert!((there.samples.qdd[j][end] - start.qdd[j]).abs() < 1e-7);
-    }
-}
-
-#[test]
-fn moves_with_missing_limits_and_unusable_states() {
-    let mut robot = arm();
-    let rest = State::rest;
-    let same = transition(&robot, &rest(&[0.1; 7]), &rest(&[0.1; 7]), 100.0).unwrap();
-    assert_eq!((same.duration, same.samples.len()), (0.0, 1));
-    let refused = |robot: &Robot, a: &State, b: &State| {
-        let error = transition(robot, a, b, 100.0).unwrap_err();
-        assert!(error.is_argument());
-        error.to_string()
-    };
-    let far = refused(
-        &robot,
-        &rest(&[0.0; 7]),
-        &rest(&[0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0]),
-    );
-    assert!(far.contains("joint3") && far.contains("target") && far.contains("position limits"));
-    let nan = refused(&robot, &rest(&[f64::NAN; 7]), &rest(&[0.0; 7]));
-    assert!(nan.contains("joint1") && nan.contains("not finite"));
-    assert!(refused(&robot, &rest(&[0.0; 6]), &rest(&[0.0; 7])).contains("start"));
-
-    robot.joints[2].limits.acceleration = f64::INFINITY;
-    robot.joints[2].limits.jerk = f64::INFINITY;
-    robot.joints[4].limits.position = [f64::NEG_INFINITY, f64::INFINITY];
-    let m = transition(&robot, &rest(&[0.0; 7]), &rest(&[1.0; 7]), 100.0).unwrap();
-    assert_eq!(m.warnings.len(), 2);
-    assert!(
-        m.warnings[0]
-            .to_string()
-            .contains("joint3: has no acceleration limit; 4.35")
-    );
-    check_move(&robot, &m);
-    robot.joints[6].limits.velocity = f64::INFINITY;
-    let message = refused(&robot, &rest(&[0.0; 7]), &rest(&[1.0; 7]));
-    assert!(message.contains("joint7") && message.contains("`velocity`"));
 }

@@ -23,6 +23,8 @@ pub(crate) struct JointEntry {
     position_resolution: Option<Spanned<f64>>,
     gear_ratio: Option<Spanned<f64>>,
     piston: Option<Spanned<Vec<f64>>>,
+    continuous_torque: Option<Spanned<f64>>,
+    continuous_power: Option<Spanned<f64>>,
     armature: Option<Spanned<f64>>,
     viscous: Option<Spanned<f64>>,
     coulomb: Option<Spanned<f64>>,
@@ -149,6 +151,20 @@ pub(crate) fn joint_values(
         "position_resolution",
         what,
     )?;
+    for (to, entry, key) in [
+        (
+            &mut joint.continuous_torque,
+            &entry.continuous_torque,
+            "continuous_torque",
+        ),
+        (
+            &mut joint.continuous_power,
+            &entry.continuous_power,
+            "continuous_power",
+        ),
+    ] {
+        *to = positive_finite(source, entry, key, what)?.or(*to);
+    }
     if let Some(ratio) = &entry.gear_ratio {
         let value = *ratio.get_ref();
         if !in_range(value) || value == 0.0 {

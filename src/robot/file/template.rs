@@ -76,6 +76,18 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
             &format!("{angle}: encoder step"),
         );
         key("gear_ratio", joint.gear_ratio, 100.0, gear);
+        key(
+            "continuous_torque",
+            joint.continuous_torque,
+            25.0,
+            &format!("{torque}: root mean square that it bears for ever"),
+        );
+        key(
+            "continuous_power",
+            joint.continuous_power,
+            100.0,
+            "W: mean mechanical power that it bears for ever",
+        );
         let [armature, viscous, coulomb, offset] = joint.terms;
         key(
             "armature",

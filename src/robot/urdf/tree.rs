@@ -249,6 +249,8 @@ fn coordinate_of(
         position_resolution: None,
         gear_ratio: None,
         piston: None,
+        continuous_torque: None,
+        continuous_power: None,
         terms: [0.0, joint.damping, joint.friction, 0.0],
         identify: [false; 4],
     })

@@ -108,6 +108,8 @@ fn split(robot: &mut Robot, joint: &str, axes: &[Vector3<f64>]) -> Result<(), St
             position_resolution: None,
             gear_ratio: None,
             piston: None,
+            continuous_torque: None,
+            continuous_power: None,
             terms: [0.0; 4],
             identify: [false; 4],
         };

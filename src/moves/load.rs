@@ -1,0 +1,195 @@
+//! What a leg asks of the actuators, sampled: torques, and of closed chains the motion of the actuators
+//! and the limits of the pose.
+
+use super::Leg;
+use crate::dynamics::Samples;
+use crate::error::Result;
+use crate::plant::Plant;
+
+/// Samples of a leg: so many a second, within bounds.
+const RATE: f64 = 500.0;
+const FEWEST: usize = 100;
+const MOST: usize = 4000;
+/// Factor at which a leg counts as standing.
+const SLOWEST: f64 = 1e6;
+/// Share of a limit that counts as kept.
+const KEPT: f64 = 1.0 + 1e-6;
+
+/// Largest torque of an actuator during a move.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct TorquePeak {
+    /// name of the actuator
+    pub joint: String,
+    /// largest magnitude at a sample, N m or N
+    pub value: f64,
+    /// its limit; `None` where none is stated
+    pub limit: Option<f64>,
+    /// share of the limit
+    pub used: Option<f64>,
+}
+
+/// The limit that is used most.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Most {
+    /// share; 1 at the limit
+    pub used: f64,
+    /// what it is about
+    pub what: String,
+}
+
+impl Most {
+    fn offer(&mut self, used: f64, what: impl FnOnce() -> String) {
+        // what is not a number is beyond every limit
+        if used > self.used || used.is_nan() {
+            self.used = if used.is_nan() { f64::INFINITY } else { used };
+            self.what = what();
+        }
+    }
+
+    /// Whether the limit holds.
+    pub fn kept(&self) -> bool {
+        self.used <= KEPT
+    }
+}
+
+/// Samples of a leg, ends included.
+fn samples(leg: &Leg) -> Samples {
+    let count = ((leg.duration * RATE) as usize).clamp(FEWEST, MOST) + 1;
+    let mut x = Samples::zeros(leg.profiles.len(), count);
+    for (k, p) in leg.profiles.iter().enumerate() {
+        for s in 0..count {
+            let at = k * count + s;
+            [x.q[at], x.qd[at], x.qdd[at]] = p.at(leg.duration * s as f64 / (count - 1) as f64);
+        }
+    }
+    x
+}
+
+/// The same samples `factor` times as slow; without end: at rest.
+fn slower(x: &Samples, factor: f64) -> Samples {
+    let mut out = x.clone();
+    out.qd.iter_mut().for_each(|v| *v /= factor);
+    out.qdd.iter_mut().for_each(|a| *a /= factor * factor);
+    out
+}
+
+/// Largest torques of samples, raised in `peaks`.
+fn torques(plant: &Plant, x: &Samples, peaks: &mut [f64]) -> Result<()> {
+    let tau = plant.nominal_torque(x)?;
+    for (peak, row) in peaks.iter_mut().zip(tau.chunks_exact(x.count)) {
+        *peak = row.iter().fold(
+            *peak,
+            |m, t| if t.is_nan() { f64::NAN } else { m.max(t.abs()) },
+        );
+    }
+    Ok(())
+}
+
+/// The limit that samples use most, `share` of the actuators' limits of velocity, acceleration and jerk
+/// being allowed.
+fn most(plant: &Plant, x: &Samples, share: f64) -> Result<Most> {
+    let mut out = Most {
+        used: 0.0,
+        what: String::new(),
+    };
+    let joints = plant.actuators();
+    let mut peaks = vec![0.0; joints.len()];
+    torques(plant, x, &mut peaks)?;
+    for (joint, peak) in joints.iter().zip(&peaks) {
+        let limit = joint.limits.effort;
+        out.offer(peak / limit, || {
+            format!("torque of {}: {peak:.4} of {limit:.4}", joint.name)
+        });
+    }
+    let Some(mechanism) = plant.mechanism() else {
+        return Ok(out);
+    };
+    let moved = plant.actuator_motion(x)?;
+    for (a, joint) in joints.iter().enumerate() {
+        let l = joint.limits;
+        let [low, high] = l.position;
+        for s in 0..moved.count {
+            let [q, v, w] = moved.at(a, s);
+            if low.is_finite() && high.is_finite() {
+                let used = (q - 0.5 * (low + high)).abs() / (0.5 * (high - low));
+                out.offer(used, || {
+                    format!(
+                        "position of {}: {q:.4}, its limits are [{low}, {high}]",
+                        joint.name
+                    )
+                });
+            }
+            out.offer(v.abs() / (share * l.velocity), || {
+                format!("velocity of {}", joint.name)
+            });
+            out.offer(w.abs() / (share * l.acceleration), || {
+                format!("acceleration of {}", joint.name)
+            });
+        }
+    }
+    let pairs = mechanism.pairs();
+    let x = mechanism.platform_motion(x)?;
+    for s in 0..x.count {
+        let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * x.count + s]).collect();
+        for u in mechanism.platform().pose_uses(&pose, &pairs) {
+            out.offer(u.used(), || {
+                format!("{}: {:.4} of {:.4}", u.name, u.value, u.limit)
+            });
+        }
+    }
+    Ok(out)
+}
+
+/// The leg as slow as the limits ask for that were sampled: the factor is found by bisection to 1 %.
+/// Otherwise the limit that no slowness keeps, because the postures alone exceed it. A leg that may not
+/// be slowed (its ends move) is taken as it is or not at all.
+pub fn bearable(
+    plant: &Plant,
+    leg: &Leg,
+    may_slow: bool,
+) -> Result<std::result::Result<Leg, Most>> {
+    let x = samples(leg);
+    let share = if may_slow { leg.scale } else { 1.0 };
+    let first = most(plant, &x, share)?;
+    if first.kept() {
+        return Ok(Ok(leg.clone()));
+    }
+    let held = most(plant, &slower(&x, SLOWEST), share)?;
+    if !may_slow || !held.kept() {
+        return Ok(Err(if may_slow { held } else { first }));
+    }
+    let (mut low, mut high) = (1.0, 2.0);
+    while high < SLOWEST && !most(plant, &slower(&x, high), share)?.kept() {
+        (low, high) = (high, 2.0 * high);
+    }
+    while high > 1.01 * low {
+        let middle = 0.5 * (low + high);
+        match most(plant, &slower(&x, middle), share)?.kept() {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    Ok(Ok(leg.stretched(high)))
+}
+
+/// Largest torques of all legs.
+pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
+    let joints = plant.actuators();
+    let mut most = vec![0.0; joints.len()];
+    for leg in legs {
+        torques(plant, &samples(leg), &mut most)?;
+    }
+    let each = joints.iter().zip(most);
+    Ok(each
+        .map(|(joint, value)| {
+            let limit = joint.limits.effort;
+            let limit = limit.is_finite().then_some(limit);
+            TorquePeak {
+                joint: joint.name.clone(),
+                value,
+                limit,
+                used: limit.map(|l| value / l),
+            }
+        })
+        .collect())
+}

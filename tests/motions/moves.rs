@@ -1,0 +1,561 @@
+//! Moves against their limits, against another planner, and among walls; the rehearsal table.
+
+use excite::collision::Shape;
+use excite::collision::scene::{Obstacle, Scene, Volume, poses};
+use excite::moves::{Move, SPEEDS, Settings, State, rehearse};
+use excite::robot::JointTerm;
+use excite::robot::{Limits, Robot};
+use excite::trajectory::{Basis, Ends, Fourier, Series, Trajectory, extrema};
+use excite::{Error, Plant};
+use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rsruckig::prelude::{
+    InputParameter, Ruckig, Synchronization, ThrowErrorHandler, Trajectory as Profile,
+};
+
+const ROBOTS: [&str; 8] = [
+    "panda", "ur10", "ur5e", "ur10e", "iiwa14", "puma560", "scara", "planar2",
+];
+
+fn full() -> Settings {
+    Settings {
+        scale: 1.0,
+        ..Settings::default()
+    }
+}
+
+/// The limits with what a move assumes where none is stated.
+fn limits(plant: &Plant) -> Vec<Limits> {
+    let assumed = |value: f64, other: f64| if value.is_finite() { value } else { other };
+    let joints = plant.moved().joints.iter();
+    joints
+        .map(|j| {
+            let mut l = j.limits;
+            l.velocity = assumed(l.velocity, 1.0);
+            l.acceleration = assumed(l.acceleration, l.velocity / 0.2);
+            l.jerk = assumed(l.jerk, l.acceleration / 0.1);
+            l
+        })
+        .collect()
+}
+
+fn posture(robot: &Robot, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let each = robot.joints.iter().map(|j| {
+        let [low, high] = j.limits.position.map(|x| x.clamp(-3.0, 3.0));
+        rng.random_range(low..high)
+    });
+    each.collect()
+}
+
+/// A motion that is free at its ends and uses a share of the limits.
+fn motion(robot: &Robot, limits: &[Limits], share: f64, rng: &mut ChaCha8Rng) -> Fourier {
+    let harmonics: Vec<u32> = vec![1, 2, 3];
+    let basis = Basis::new(&harmonics, Ends::Free, robot.dof(), None).unwrap();
+    let x: Vec<f64> = (0..basis.len())
+        .map(|_| rng.random_range(-1.0..1.0))
+        .collect();
+    let mut f = basis.fourier(rng.random_range(2.0..8.0), &x);
+    for (series, l) in f.joints.iter_mut().zip(limits) {
+        let [low, high] = l.position.map(|x| x.clamp(-3.0, 3.0));
+        series.constant = 0.0;
+        let largest = |order| {
+            extrema(f.period, &f.harmonics, series, order)
+                .largest()
+                .value
+        };
+        let factor = [
+            0.5 * (high - low) / largest(0),
+            l.velocity / largest(1),
+            l.acceleration / largest(2),
+            l.jerk / largest(3),
+        ];
+        let factor = share * factor.into_iter().fold(f64::INFINITY, f64::min);
+        let all = series.sin.iter_mut().chain(&mut series.cos);
+        all.for_each(|v| *v *= factor);
+        series.constant = 0.5 * (low + high);
+    }
+    f
+}
+
+/// No limit is exceeded at 10 kHz, states belong together, the ends are met.
+fn check(plant: &Plant, limits: &[Limits], m: &Move, rate: f64) {
+    let s = m.sample(rate).unwrap();
+    assert_eq!(s.t[s.len() - 1], m.duration);
+    for (j, l) in limits.iter().enumerate() {
+        let name = format!("{} joint {j}", plant.name());
+        let last = s.len() - 1;
+        for i in 0..=last {
+            let (q, v, a) = (s.q[j][i], s.qd[j][i], s.qdd[j][i]);
+            assert!(
+                q >= l.position[0] - 1e-9 && q <= l.position[1] + 1e-9,
+                "{name}: {q}"
+            );
+            assert!(v.abs() <= l.velocity * (1.0 + 1e-8), "{name}: {v}");
+            assert!(a.abs() <= l.acceleration * (1.0 + 1e-8), "{name}: {a}");
+            if i == 0 {
+                continue;
+            }
+            let h = s.t[i] - s.t[i - 1];
+            if h > 1e-7 {
+                let jerk = (a - s.qdd[j][i - 1]).abs() / h;
+                assert!(jerk <= l.jerk * (1.0 + 1e-6) + 1e-7, "{name}: {jerk}");
+            }
+            let (q0, v0) = (s.q[j][i - 1], s.qd[j][i - 1]);
+            assert!((q - q0 - 0.5 * h * (v + v0)).abs() <= 0.25 * h.powi(3) * l.jerk + 1e-12);
+            assert!((v - v0 - 0.5 * h * (a + s.qdd[j][i - 1])).abs() <= h * h * l.jerk + 1e-12);
+        }
+        // the state just inside of the ends, not only the one that is given back at them
+        let near = 1e-12;
+        let (mut q, mut v, mut a) = (vec![0.0; m.dof()], vec![0.0; m.dof()], vec![0.0; m.dof()]);
+        for (t, end) in [(near, &m.from), (m.duration - near, &m.to)] {
+            m.evaluate(t, [&mut q, &mut v, &mut a]);
+            assert!(
+                (q[j] - end.q[j]).abs() < 1e-9,
+                "{name}: {} {}",
+                q[j],
+                end.q[j]
+            );
+            assert!((v[j] - end.qd[j]).abs() < 1e-9 + 2.0 * near * l.acceleration);
+            assert!(
+                (a[j] - end.qdd[j]).abs() < 1e-9 + 2.0 * near * l.jerk,
+                "{name}"
+            );
+        }
+        let p = &m.joints[j].peaks;
+        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+        assert!(p.velocity >= largest(&s.qd[j]) - 1e-12);
+        assert!(p.acceleration >= largest(&s.qdd[j]) - 1e-12);
+    }
+    for t in &m.torques {
+        assert!(
+            t.used.is_none_or(|u| u <= 1.0 + 1e-6),
+            "{}: {t:?}",
+            plant.name()
+        );
+    }
+}
+
+/// What another planner says: the time of all together, and the fastest of each joint alone.
+fn reference(from: &State, to: &State, limits: &[Limits]) -> (f64, f64) {
+    let n = limits.len();
+    let mut input = InputParameter::<0>::new(Some(n));
+    input.synchronization = Synchronization::Time;
+    for (k, l) in limits.iter().enumerate() {
+        input.current_position[k] = from.q[k];
+        input.current_velocity[k] = from.qd[k];
+        input.current_acceleration[k] = from.qdd[k];
+        input.target_position[k] = to.q[k];
+        input.target_velocity[k] = to.qd[k];
+        input.target_acceleration[k] = to.qdd[k];
+        input.max_velocity[k] = l.velocity.max(to.qd[k].abs());
+        input.max_acceleration[k] = l.acceleration;
+        input.max_jerk[k] = l.jerk;
+    }
+    let mut planner = Ruckig::<0, ThrowErrorHandler>::new(Some(n), 1.0);
+    let mut out = Profile::<0>::new(Some(n));
+    planner.calculate(&input, &mut out).unwrap();
+    let slowest = (0..n).map(|k| out.independent_min_durations[k]);
+    (out.duration, slowest.fold(0.0, f64::max))
+}
+
+#[test]
+fn random_moves_keep_every_limit_at_10_khz_and_are_time_optimal() {
+    let (mut made, mut refused, mut slowed) = (0, Vec::new(), 0);
+    let mut ratio = 0.0_f64;
+    for (r, name) in ROBOTS.iter().enumerate() {
+        let plant = Plant::load(name).unwrap();
+        let robot = plant.robot();
+        let limits = limits(&plant);
+        let mut rng = ChaCha8Rng::seed_from_u64(r as u64);
+        for k in 0..63 {
+            let a = State::rest(&posture(robot, &mut rng));
+            let b = match k % 3 {
+                0 => State::rest(&posture(robot, &mut rng)),
+                _ => {
+                    let share = if k % 2 == 0 { 0.5 } else { 0.9 };
+                    State::start_of(&motion(robot, &limits, share, &mut rng))
+                }
+            };
+            let (from, to) = if k % 3 == 2 { (&b, &a) } else { (&a, &b) };
+            match Move::plan(&plant, from, to, &full(), None) {
+                Ok(m) => {
+                    check(&plant, &limits, &m, 10_000.0);
+                    made += 1;
+                    slowed += usize::from(m.slowed > 1.0);
+                    let (together, slowest) = reference(from, to, &limits);
+                    if m.slowed == 1.0 && k % 3 == 0 {
+                        ratio = ratio.max(m.duration / slowest);
+                        assert!((m.duration / slowest - 1.0).abs() < 1e-2, "{name} {k}");
+                    } else if m.slowed == 1.0 && m.scale == 1.0 && m.via.is_empty() {
+                        assert!(m.duration >= slowest * 0.999, "{name} {k}");
+                        ratio = ratio.max(m.duration / together);
+                    }
+                }
+                Err(e) => refused.push(format!("{name} {k}: {e}")),
+            }
+        }
+    }
+    println!(
+        "{made} moves, {slowed} slowed, {} refused, ratio {ratio}",
+        refused.len()
+    );
+    refused.iter().for_each(|e| println!("{e}"));
+    assert!(made >= 500, "{refused:?}");
+}
+
+/// The two links of `planar2` as capsules, among balls in the plane of the arm.
+fn among(balls: &[(&str, [f64; 2], f64)]) -> (Plant, Scene) {
+    let plant = Plant::load("planar2").unwrap();
+    let link = |body: usize| Volume {
+        link: format!("link{}", body + 1),
+        body: Some(body),
+        shape: Shape::Capsule {
+            from: Vector3::zeros(),
+            to: Vector3::new(0.5, 0.0, 0.0),
+            radius: 0.03,
+        },
+    };
+    let ball = |(name, [x, z], radius): &(&str, [f64; 2], f64)| Obstacle::Solid {
+        name: (*name).into(),
+        shape: Shape::Sphere {
+            centre: Vector3::new(*x, 0.0, *z),
+            radius: *radius,
+        },
+    };
+    let mut scene = Scene {
+        volumes: vec![link(0), link(1)],
+        obstacles: balls.iter().map(ball).collect(),
+        margin: 0.02,
+        ..Scene::default()
+    };
+    scene.pairs = scene.all_pairs(plant.robot(), |_, _| false);
+    (plant, scene)
+}
+
+/// Least distance at samples.
+fn sampled(plant: &Plant, scene: &Scene, m: &Move) -> f64 {
+    let s = m.sample(2000.0).unwrap();
+    let (mut q, mut at) = (vec![0.0; 2], Vec::new());
+    let mut least = f64::INFINITY;
+    for i in 0..s.len() {
+        q.iter_mut().zip(&s.q).for_each(|(q, c)| *q = c[i]);
+        poses(plant.robot(), &q, &mut at);
+        for pair in &scene.pairs {
+            least = least.min(scene.separation(pair, &at).distance);
+        }
+    }
+    least
+}
+
+#[test]
+fn a_way_round_a_ball_is_found_and_proven() {
+    let (plant, scene) = among(&[("ball", [0.8, 0.0], 0.1)]);
+    let (from, to) = (State::rest(&[-0.6, 0.0]), State::rest(&[0.6, 0.0]));
+    let free = Move::plan(&plant, &from, &to, &Settings::default(), None).unwrap();
+    assert!(free.via.is_empty() && free.clearance.is_none());
+    assert!(sampled(&plant, &scene, &free) < 0.0);
+    for scale in [0.2, 1.0] {
+        let settings = Settings {
+            scale,
+            ..Settings::default()
+        };
+        let m = Move::plan(&plant, &from, &to, &settings, Some(&scene)).unwrap();
+        assert!(
+            !m.via.is_empty() && m.via.len() < 6 && m.tries > 0,
+            "{:?}",
+            m.via
+        );
+        check(&plant, &limits(&plant), &m, 2000.0);
+        let found = m.clearance.as_ref().unwrap();
+        let least = sampled(&plant, &scene, &m);
+        assert!(found.bound >= 0.02 - 1e-12 && found.bound <= found.met);
+        assert!(
+            least >= found.bound && least - found.bound < 5e-3,
+            "{least} {found:?}"
+        );
+        assert!(found.between[1] == "ball");
+        // the same question has the same answer
+        let again = Move::plan(&plant, &from, &to, &settings, Some(&scene)).unwrap();
+        assert_eq!(again, m);
+        // each speed is used somewhere
+        let used = m.joints.iter().map(|j| j.used[0]).fold(0.0, f64::max);
+        assert!(used > 0.5 * scale && used <= scale * (1.0 + 1e-9));
+    }
+}
+
+#[test]
+fn what_walls_a_posture_in_is_named() {
+    let posts = [
+        ("upper post", [0.3, 0.17], 0.08),
+        ("lower post", [0.3, -0.17], 0.08),
+    ];
+    let (plant, scene) = among(&posts);
+    let (from, to) = (State::rest(&[0.0, 0.0]), State::rest(&[2.0, 0.5]));
+    let settings = Settings {
+        tries: 300,
+        ..Settings::default()
+    };
+    let plan = |from: &State, to: &State| Move::plan(&plant, from, to, &settings, Some(&scene));
+    let error = plan(&from, &to).unwrap_err();
+    assert!(matches!(error, Error::Infeasible(_)));
+    let text = error.to_string();
+    for part in ["300 random postures", "link1 and upper post", "in the way"] {
+        assert!(text.contains(part), "{text}");
+    }
+    // an end that touches
+    let text = plan(&State::rest(&[0.5, 0.0]), &to)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("start") && text.contains("link1 and upper post"),
+        "{text}"
+    );
+    let text = plan(&from, &State::rest(&[-0.5, 0.0]))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("target") && text.contains("lower post"),
+        "{text}"
+    );
+}
+
+#[test]
+fn into_and_out_of_a_motion_among_walls() {
+    let (plant, scene) = among(&[("ball", [0.8, 0.0], 0.1)]);
+    // begins above the ball, moving down towards it
+    let series = |constant: f64, sin: f64| Series {
+        constant,
+        sin: vec![sin],
+        cos: vec![0.0],
+    };
+    let f = Fourier::new(4.0, vec![1], vec![series(0.9, -0.3), series(0.0, 0.1)]).unwrap();
+    let low = [-0.9, 0.3];
+    let there = Move::approach(&plant, &low, &f, &Settings::default(), Some(&scene)).unwrap();
+    let back = Move::retreat(&plant, &f, &low, &Settings::default(), Some(&scene)).unwrap();
+    for m in [&there, &back] {
+        check(&plant, &limits(&plant), m, 2000.0);
+        assert!(sampled(&plant, &scene, m) >= m.clearance.as_ref().unwrap().bound);
+        assert!(m.via.len() > 1);
+    }
+    assert!(there.to.qd[0] < -0.4 && back.from.qd[0] < -0.4);
+}
+
+#[test]
+fn torques_slow_a_move_down_and_what_cannot_be_held_is_named() {
+    let mut robot = Robot::load("planar2").unwrap();
+    // 31.9 N m hold the stretched arm
+    robot.joints[0].limits.effort = 34.0;
+    let brisk = Settings {
+        scale: 0.3,
+        ..Settings::default()
+    };
+    let plant = Plant::from(&robot);
+    let (from, to) = (State::rest(&[-0.3, 0.0]), State::rest(&[0.6, 0.0]));
+    let free = Move::plan(&Plant::load("planar2").unwrap(), &from, &to, &brisk, None).unwrap();
+    let m = Move::plan(&plant, &from, &to, &brisk, None).unwrap();
+    assert!(m.slowed > 1.0 && free.slowed == 1.0);
+    assert!((m.duration - free.duration * m.slowed).abs() < 1e-9);
+    let used = m.torques[0].used.unwrap();
+    assert!(used > 0.97 && used < 1.0 + 1e-6, "{used}");
+    check(&plant, &limits(&plant), &m, 1000.0);
+    robot.joints[0].limits.effort = 30.0;
+    let error = Move::plan(&Plant::from(&robot), &from, &to, &brisk, None).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("torque of joint1") && text.contains("however slow"),
+        "{text}"
+    );
+}
+
+#[test]
+fn missing_limits_and_unusable_states() {
+    let mut robot = Robot::load("panda").unwrap();
+    let q: Vec<f64> = vec![0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.7];
+    let p: Vec<f64> = q.iter().map(|x| x + 0.1).collect();
+    let rest = State::rest;
+    let plant = Plant::from(&robot);
+    let same = Move::plan(&plant, &rest(&q), &rest(&q), &full(), None).unwrap();
+    assert_eq!((same.duration, same.sample(100.0).unwrap().len()), (0.0, 1));
+    let refused = |robot: &Robot, a: &State, b: &State, settings: &Settings| {
+        let error = Move::plan(&Plant::from(robot), a, b, settings, None).unwrap_err();
+        assert!(error.is_argument());
+        error.to_string()
+    };
+    let mut far = q.clone();
+    far[2] = 4.0;
+    let far = refused(&robot, &rest(&q), &rest(&far), &full());
+    assert!(far.contains("joint3") && far.contains("target") && far.contains("position limits"));
+    let nan = refused(&robot, &rest(&[f64::NAN; 7]), &rest(&q), &full());
+    assert!(nan.contains("joint1") && nan.contains("not finite"));
+    assert!(refused(&robot, &rest(&q[..6]), &rest(&q), &full()).contains("start"));
+    for scale in [0.0, 1.1, f64::NAN, -1.0] {
+        let settings = Settings {
+            scale,
+            ..Settings::default()
+        };
+        assert!(refused(&robot, &rest(&q), &rest(&p), &settings).contains("share"));
+    }
+    robot.joints[2].limits.velocity = f64::INFINITY;
+    robot.joints[2].limits.acceleration = f64::INFINITY;
+    robot.joints[2].limits.jerk = f64::INFINITY;
+    robot.joints[4].limits.position = [f64::NEG_INFINITY, f64::INFINITY];
+    let plant = Plant::from(&robot);
+    let m = Move::plan(&plant, &rest(&q), &rest(&p), &full(), None).unwrap();
+    assert_eq!(m.warnings.len(), 1);
+    let text = m.warnings[0].to_string();
+    assert!(
+        text.contains("panda_joint3") && text.contains("acceleration 5 rad/s^2"),
+        "{text}"
+    );
+    check(&plant, &limits(&plant), &m, 1000.0);
+    robot.joints[6].limits.jerk = -1.0;
+    assert!(refused(&robot, &rest(&q), &rest(&p), &full()).contains("joint7"));
+}
+
+#[test]
+fn parallel_robots_move_inside_the_limits_of_their_actuators() {
+    for name in ["hexapod", "delta", "h4"] {
+        let plant = Plant::load(name).unwrap();
+        let home = plant.home().unwrap().to_vec();
+        let mut to = home.clone();
+        to[0] += 0.03;
+        to[2] -= 0.02;
+        let settings = Settings::default();
+        let m = Move::plan(
+            &plant,
+            &State::rest(&home),
+            &State::rest(&to),
+            &settings,
+            None,
+        )
+        .unwrap();
+        let s = m.sample(1000.0).unwrap();
+        let x = excite::dynamics::Samples {
+            dof: s.dof(),
+            count: s.len(),
+            q: s.q.concat(),
+            qd: s.qd.concat(),
+            qdd: s.qdd.concat(),
+        };
+        let moved = plant.actuator_motion(&x).unwrap();
+        for (a, joint) in plant.actuators().iter().enumerate() {
+            let l = joint.limits;
+            for i in 0..x.count {
+                let [_, v, w] = moved.at(a, i);
+                assert!(v.abs() <= 0.2 * l.velocity * 1.001, "{name}");
+                assert!(w.abs() <= 0.2 * l.acceleration * 1.001, "{name}");
+            }
+        }
+        assert!(
+            m.duration > 0.05 && m.duration < 20.0,
+            "{name} {}",
+            m.duration
+        );
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("move.csv");
+        assert_eq!(
+            m.write(&plant, &file, false, 100.0).unwrap(),
+            m.sample(100.0).unwrap().len()
+        );
+    }
+}
+
+/// Potential energy, J.
+fn potential(robot: &Robot, q: &[f64]) -> f64 {
+    let mut at = Vec::new();
+    poses(robot, q, &mut at);
+    let each = robot.bodies.iter().zip(&at).map(|(body, pose)| {
+        let [m, x, y, z] = [0, 1, 2, 3].map(|k| body.inertia.0[k]);
+        let moment = pose.rotation * Vector3::new(x, y, z) + pose.position * m;
+        -robot.gravity.dot(&moment)
+    });
+    each.sum()
+}
+
+#[test]
+fn the_work_of_a_move_is_the_change_of_energy() {
+    let plant = Plant::load("planar2").unwrap();
+    let (a, b) = ([-0.8, 0.4], [0.9, -1.0]);
+    let m = Move::plan(&plant, &State::rest(&a), &State::rest(&b), &full(), None).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("move.csv");
+    m.write(&plant, &file, false, 5000.0).unwrap();
+    let names = ["t", "dq1", "dq2", "tau1", "tau2"].map(String::from);
+    let c = excite::trajectory::samples::read_columns(&file, &names).unwrap();
+    let power = |i: usize| c[1][i] * c[3][i] + c[2][i] * c[4][i];
+    let work: f64 = (1..c[0].len())
+        .map(|i| 0.5 * (c[0][i] - c[0][i - 1]) * (power(i) + power(i - 1)))
+        .sum();
+    let rise = potential(plant.robot(), &b) - potential(plant.robot(), &a);
+    assert!((work - rise).abs() < 1e-5 * rise.abs(), "{work} {rise}");
+}
+
+#[test]
+fn the_rehearsal_balances_power_and_counts_bytes() {
+    let mut robot = Robot::load("panda").unwrap();
+    robot
+        .joints
+        .iter_mut()
+        .for_each(|j| j.terms = [0.05, 0.0, 0.0, 0.0]);
+    robot.joints[3].continuous_torque = Some(10.0);
+    robot.joints[3].continuous_power = Some(5.0);
+    let plant = Plant::from(&robot);
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let fourier = motion(&robot, &limits(&plant), 0.9, &mut rng);
+    let mut trajectory = Trajectory::new(&robot, fourier);
+    trajectory.periods = 2;
+    let table = rehearse(&plant, &trajectory, 250.0, &SPEEDS).unwrap();
+    assert_eq!(table.speeds.len(), 3);
+    for (s, share) in table.speeds.iter().zip(SPEEDS) {
+        let through: f64 = s.joints.iter().map(|l| l.mean_power).sum::<f64>() * s.seconds / 2.0;
+        assert!(s.work.abs() < 1e-10 * through, "{} of {through}", s.work);
+        assert!((s.seconds - trajectory.duration() / share).abs() < 1e-9);
+        // what is counted is what is written
+        let slow = Fourier {
+            period: trajectory.fourier.period / share,
+            ..trajectory.fourier.clone()
+        };
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("slow.csv");
+        let samples = excite::trajectory::samples::write_samples;
+        assert_eq!(
+            samples(&file, false, &slow, 2, 250.0, None).unwrap(),
+            s.samples
+        );
+        assert_eq!(std::fs::metadata(&file).unwrap().len(), s.bytes as u64);
+        for (l, joint) in s.joints.iter().zip(&robot.joints) {
+            assert!(l.rms_torque <= l.torque && l.mean_power <= l.peak_power);
+            assert!((l.torque_used.unwrap() - l.torque / joint.limits.effort).abs() < 1e-12);
+        }
+        let rated = &s.joints[3];
+        assert!((rated.rms_used.unwrap() - rated.rms_torque / 10.0).abs() < 1e-12);
+        assert!((rated.mean_power_used.unwrap() - rated.mean_power / 5.0).abs() < 1e-12);
+        assert!(s.joints[0].rms_used.is_none());
+    }
+    let [slow, _, fast] = &table.speeds[..] else {
+        panic!()
+    };
+    for (a, b) in slow.joints.iter().zip(&fast.joints) {
+        assert!((10.0 * a.velocity - b.velocity).abs() < 1e-12);
+        assert!((100.0 * a.acceleration - b.acceleration).abs() < 1e-10);
+    }
+    // friction takes F_v ∫ q̇² dt
+    let k = JointTerm::Viscous as usize;
+    robot.joints.iter_mut().for_each(|j| j.terms[k] = 2.0);
+    let viscous = rehearse(&Plant::from(&robot), &trajectory, 250.0, &[0.3]).unwrap();
+    let f = &trajectory.fourier;
+    let omega = std::f64::consts::TAU * 0.3 / f.period;
+    let taken: f64 = (f.joints.iter())
+        .flat_map(|s| s.sin.iter().zip(&s.cos).zip(&f.harmonics))
+        .map(|((s, c), &h)| (s * s + c * c) * (f64::from(h) * omega).powi(2))
+        .sum::<f64>()
+        * (f.period / 0.3);
+    let work = viscous.speeds[0].work;
+    assert!((work - taken).abs() < 1e-9 * taken, "{work} {taken}");
+    assert!(
+        rehearse(&plant, &trajectory, 250.0, &[0.0])
+            .unwrap_err()
+            .is_argument()
+    );
+}
