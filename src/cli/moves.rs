@@ -2,7 +2,7 @@
 
 use super::{Folder, pretty, print, warn};
 use excite::moves::{Move, Settings};
-use excite::trajectory::Trajectory;
+use excite::trajectory::{Proof, Trajectory};
 use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -54,6 +54,8 @@ pub struct Args {
     /// Seed of the random postures
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    collisions: super::Collisions,
     /// Directory for the files
     #[arg(short, long, default_value = "out")]
     output: PathBuf,
@@ -77,6 +79,7 @@ pub fn read(robot: &str, path: &PathBuf) -> Result<(Plant, Trajectory, Option<Wa
 
 pub fn run(args: Args) -> Result<()> {
     let (plant, trajectory, changed) = read(&args.robot, &args.trajectory)?;
+    let plant = args.collisions.apply(plant);
     let settings = Settings {
         scale: args.scale,
         tries: args.tries,
@@ -85,12 +88,15 @@ pub fn run(args: Args) -> Result<()> {
     let folder = Folder::new(&args.output, &FILES, args.force)?;
     let park = args.to.as_ref().unwrap_or(&args.from);
     let fourier = &trajectory.fourier;
-    let scene = None;
+    let scene = plant.scene()?;
+    let scene = scene.as_deref();
     let there = Move::approach(&plant, &args.from, fourier, &settings, scene)?;
     let back = Move::retreat(&plant, fourier, park, &settings, scene)?;
     // what was assumed is the same for both
     let all = plant.warnings().iter().chain(&changed);
-    warn(&all.chain(&there.warnings).cloned().collect::<Vec<_>>());
+    let all = all.chain(scene.iter().flat_map(|s| &s.warnings));
+    let warnings: Vec<Warning> = all.chain(&there.warnings).cloned().collect();
+    warn(&warnings);
     let mut text = format!(
         "{}: moves at {:.0} % of the limits\n",
         plant.name(),
@@ -111,7 +117,7 @@ pub fn run(args: Args) -> Result<()> {
         "rate": args.rate,
         "settings": settings,
         "moves": moves,
-        "warnings": there.warnings,
+        "warnings": warnings,
     });
     let path = folder.write(FILES[2], &pretty(&json))?;
     let _ = writeln!(text, "wrote {}", path.display());
@@ -157,8 +163,16 @@ fn summary(name: &str, m: &Move) -> String {
     let _ = match &m.clearance {
         Some(c) => writeln!(
             out,
-            "  clearance at least {:.4} m for all time; closest {} and {}, {:.4} m at {:.3} s",
-            c.bound, c.between[0], c.between[1], c.met, c.time
+            "  closest: {} and {}, {:.1} mm at {:.2} s (never below {:.1} mm{})",
+            c.between[0],
+            c.between[1],
+            1e3 * c.met,
+            c.time,
+            1e3 * c.bound,
+            match c.proof {
+                Proof::Stated => ", a stated bound",
+                _ => "",
+            }
         ),
         None => writeln!(out, "  collisions were not looked at"),
     };

@@ -2,34 +2,41 @@
 //!
 //! Over a stretch `h` no distance changes faster than `L` (see [`clearance`](crate::collision::clearance)),
 //! so that it is nowhere less than `(d₀ + d₁ − L h)/2`. Stretches are halved, the longest first, until
-//! that is not below the margin for all pairs, or a distance is.
+//! that is not below the margin for all pairs, or a distance is. The paths of a closed chain are sampled, and
+//! bounded between the samples by their second differences: stated, not proven.
 
-use crate::collision::clearance::{Path, clearances, reaches};
+use crate::collision::clearance::{Fineness, Path, clearances, reaches};
 use crate::collision::scene::{Scene, poses};
-use crate::collision::shape::Pose;
-use crate::robot::Robot;
+use crate::error::{Error, Result};
+use crate::plant::Plant;
+use crate::robot::Motion;
+use crate::solid::Pose;
+use crate::trajectory::certificate::Proof;
 use std::collections::VecDeque;
 
 /// Distances closer to the margin than this are not told from it, m.
 const FINEST: f64 = 1e-6;
-/// Instants at which the least clearance is looked for before stretches are halved.
-const INSTANTS: usize = 48;
-/// How closely the least clearance is bounded, m.
-const TOLERANCE: f64 = 1e-3;
+/// How closely the least clearance of a tree is bounded.
+const CLOSELY: Fineness = Fineness {
+    stretches: 60,
+    tolerance: 1e-3,
+    shortest: 1e-5,
+};
+/// Samples of a path of a closed chain.
+const SAMPLES: usize = 200;
 
 /// Where a path is blocked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blocked {
-    /// index of the pair
-    pub pair: usize,
+    /// index of the pair; `None`: a pose that cannot be reached
+    pub pair: Option<usize>,
     /// distance there, m
     pub distance: f64,
-    /// when, s
-    pub time: f64,
 }
 
 /// Least clearance of a move over all time.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Least {
     /// the two bodies, or a body and an obstacle
     pub between: [String; 2],
@@ -37,72 +44,124 @@ pub struct Least {
     pub met: f64,
     /// when, s
     pub time: f64,
-    /// at no time is the distance of any pair less than this, m
+    /// the room of no pair is at any time less than this, m
     pub bound: f64,
     /// least distance that is allowed, m
     pub margin: f64,
+    /// how the bound is known
+    pub proof: Proof,
+    /// links whose volume is not known: what touches there is not seen
+    pub unseen: Vec<String>,
 }
 
 /// A robot among the things that it must not touch.
 pub struct Guard<'a> {
-    robot: &'a Robot,
+    plant: &'a Plant,
     /// volumes, obstacles and pairs
     pub scene: &'a Scene,
-    reaches: Vec<Vec<f64>>,
+    /// reaches of the joints where they are the same for all paths
+    reaches: Option<Vec<Vec<f64>>>,
 }
 
 impl<'a> Guard<'a> {
-    /// Of a robot whose coordinates are its joints.
-    pub fn new(robot: &'a Robot, scene: &'a Scene) -> Self {
-        let reach = |pair| reaches(robot, scene, pair);
-        Guard {
-            robot,
+    /// Of a robot and its scene.
+    pub fn new(plant: &'a Plant, scene: &'a Scene) -> Self {
+        let mut guard = Guard {
+            plant,
             scene,
-            reaches: scene.pairs.iter().map(reach).collect(),
+            reaches: None,
+        };
+        let slides = |b: &crate::robot::Body| b.motion == Motion::Prismatic;
+        if !plant.robot().bodies.iter().any(slides) {
+            guard.reaches = Some(guard.reaches_within(&vec![0.0; plant.robot().dof()]));
+        }
+        guard
+    }
+
+    fn reaches_within(&self, largest: &[f64]) -> Vec<Vec<f64>> {
+        let reach = |pair| reaches(self.plant.robot(), self.scene, pair, largest);
+        self.scene.pairs.iter().map(reach).collect()
+    }
+
+    /// Names of the two of a pair, in words.
+    pub fn names(&self, pair: Option<usize>) -> String {
+        match pair.and_then(|p| self.scene.pairs.get(p)) {
+            Some(pair) => self.scene.names(pair).join(" and "),
+            None => "poses out of reach".into(),
         }
     }
 
-    /// Names of a pair.
-    pub fn names(&self, pair: usize) -> [String; 2] {
-        self.scene.names(&self.scene.pairs[pair]).map(String::from)
+    fn margin(&self, pair: usize) -> f64 {
+        self.scene.pairs[pair].margin
     }
 
-    fn distances(&self, q: &[f64], pairs: &[usize], at: &mut Vec<Pose>) -> Vec<f64> {
-        poses(self.robot, q, at);
+    /// Distances of some pairs in a posture.
+    fn distances(&self, x: &[f64], pairs: &[usize], at: &mut Vec<Pose>) -> Result<Vec<f64>> {
+        let robot = self.plant.robot();
+        match self.plant.mechanism() {
+            None => poses(robot, x, at),
+            Some(_) => poses(robot, &self.plant.posture(x)?, at),
+        }
         let distance = |&p: &usize| self.scene.separation(&self.scene.pairs[p], at).distance;
-        pairs.iter().map(distance).collect()
+        Ok(pairs.iter().map(distance).collect())
     }
 
-    /// The closest pair of a posture, where it is closer than the margin.
-    pub fn touching(&self, q: &[f64]) -> Option<Blocked> {
+    /// The pair of a posture that is short of its margin by most.
+    pub fn touching(&self, x: &[f64]) -> Option<Blocked> {
         let pairs: Vec<usize> = (0..self.scene.pairs.len()).collect();
-        let d = self.distances(q, &pairs, &mut Vec::new());
-        let least = (0..d.len()).min_by(|a, b| d[*a].total_cmp(&d[*b]))?;
+        let Ok(d) = self.distances(x, &pairs, &mut Vec::new()) else {
+            return Some(UNREACHED);
+        };
+        let room = |p: usize| d[p] - self.margin(p);
+        let least = (0..d.len()).min_by(|a, b| room(*a).total_cmp(&room(*b)))?;
         // a distance that is not a number is no distance
-        (!(d[least] >= self.scene.margin)).then_some(Blocked {
-            pair: least,
+        (!(room(least) >= 0.0)).then_some(Blocked {
+            pair: Some(least),
             distance: d[least],
-            time: 0.0,
         })
     }
 
-    /// Whether all pairs keep the margin over a whole path.
+    /// Whether all pairs keep their margins over a whole path.
     ///
     /// # Errors
-    /// A pair that does not, where and when.
+    /// A pair that does not.
     pub fn free(&self, path: &dyn Path) -> Result<(), Blocked> {
-        let margin = self.scene.margin;
-        let n = self.robot.joints.len();
+        match self.plant.mechanism() {
+            None => self.proven(path),
+            Some(_) => {
+                let along = self.along(path).map_err(|_| UNREACHED)?;
+                let short = |p: &usize| !(stated(&along[*p]) >= self.margin(*p));
+                match (0..along.len()).find(short) {
+                    None => Ok(()),
+                    Some(p) => Err(Blocked {
+                        pair: Some(p),
+                        distance: along[p].iter().copied().fold(f64::INFINITY, f64::min),
+                    }),
+                }
+            }
+        }
+    }
+
+    fn proven(&self, path: &dyn Path) -> Result<(), Blocked> {
+        let n = self.plant.robot().dof();
+        let own;
+        let reaches = match &self.reaches {
+            Some(known) => known,
+            None => {
+                let largest: Vec<f64> = (0..n).map(|j| path.largest(j)).collect();
+                own = self.reaches_within(&largest);
+                &own
+            }
+        };
         let (mut q, mut v, mut at) = (vec![0.0; n], vec![0.0; n], Vec::new());
         let mut look = |t: f64, pairs: &[usize]| -> Result<Vec<f64>, Blocked> {
             path.position(t, &mut q);
-            let d = self.distances(&q, pairs, &mut at);
-            match (0..d.len()).find(|&k| !(d[k] >= margin)) {
+            let d = self.distances(&q, pairs, &mut at).map_err(|_| UNREACHED)?;
+            match (0..d.len()).find(|&k| !(d[k] >= self.margin(pairs[k]))) {
                 None => Ok(d),
                 Some(k) => Err(Blocked {
-                    pair: pairs[k],
+                    pair: Some(pairs[k]),
                     distance: d[k],
-                    time: t,
                 }),
             }
         };
@@ -114,15 +173,14 @@ impl<'a> Guard<'a> {
             path.speed(from, from + h, &mut v);
             let mut open = Vec::new();
             for (k, &pair) in pairs.iter().enumerate() {
-                let rate: f64 = v.iter().zip(&self.reaches[pair]).map(|(v, r)| v * r).sum();
-                if 0.5 * (d0[k] + d1[k] - rate * h) >= margin {
+                let rate: f64 = v.iter().zip(&reaches[pair]).map(|(v, r)| v * r).sum();
+                if 0.5 * (d0[k] + d1[k] - rate * h) >= self.margin(pair) {
                     continue;
                 }
-                if rate * h < FINEST {
+                if !(rate * h >= FINEST) {
                     return Err(Blocked {
-                        pair,
+                        pair: Some(pair),
                         distance: d0[k].min(d1[k]),
-                        time: from,
                     });
                 }
                 open.push(k);
@@ -140,21 +198,96 @@ impl<'a> Guard<'a> {
         Ok(())
     }
 
-    /// Least clearance of a path that is free.
-    pub fn least(&self, path: &dyn Path) -> Option<Least> {
-        let shortest = 1e-5 * path.duration();
-        let all = clearances(self.robot, self.scene, path, INSTANTS, TOLERANCE, shortest);
-        let closest = all.iter().min_by(|a, b| a.met.total_cmp(&b.met))?;
-        let bound = all.iter().map(|c| c.bound).fold(f64::INFINITY, f64::min);
-        Some(Least {
-            between: self.names(closest.pair),
-            met: closest.met,
-            time: closest.time,
-            // `free` has proven the margin
-            bound: bound.max(self.scene.margin.min(closest.met)),
-            margin: self.scene.margin,
+    /// Distances of all pairs at even samples of a path.
+    fn along(&self, path: &dyn Path) -> Result<Vec<Vec<f64>>> {
+        let pairs: Vec<usize> = (0..self.scene.pairs.len()).collect();
+        let mut out = vec![Vec::with_capacity(SAMPLES + 1); pairs.len()];
+        let (mut x, mut at) = (vec![0.0; self.plant.coordinates()], Vec::new());
+        for i in 0..=SAMPLES {
+            path.position(path.duration() * i as f64 / SAMPLES as f64, &mut x);
+            let d = self.distances(&x, &pairs, &mut at)?;
+            out.iter_mut().zip(d).for_each(|(list, d)| list.push(d));
+        }
+        Ok(out)
+    }
+
+    /// Least clearance of a path: of a tree for all time, of a closed chain with the bound stated. `None`
+    /// where there are no pairs.
+    ///
+    /// # Errors
+    /// A pose of a closed chain that cannot be reached.
+    pub fn least(&self, path: &dyn Path) -> Result<Option<Least>> {
+        // pair, met, time, bound
+        let (all, proof): (Vec<(usize, f64, f64, f64)>, _) = match self.plant.mechanism() {
+            None => {
+                let found = clearances(self.plant.robot(), self.scene, path, CLOSELY);
+                let each = found.iter().map(|c| (c.pair, c.met, c.time, c.bound));
+                (each.collect(), Proof::Enclosed)
+            }
+            Some(_) => {
+                let step = path.duration() / SAMPLES as f64;
+                let along = self.along(path)?;
+                let each = along.iter().enumerate().map(|(p, d)| {
+                    let k = (0..d.len()).min_by(|a, b| d[*a].total_cmp(&d[*b]));
+                    let k = k.unwrap_or(0);
+                    (p, d[k], k as f64 * step, stated(d))
+                });
+                (each.collect(), Proof::Stated)
+            }
+        };
+        let closest = (all.iter())
+            .min_by(|a, b| (a.1 - self.margin(a.0)).total_cmp(&(b.1 - self.margin(b.0))));
+        let Some(&(pair, met, time, _)) = closest else {
+            return Ok(None);
+        };
+        let margin = self.margin(pair);
+        let room = |&(p, _, _, bound): &(usize, f64, f64, f64)| bound - self.margin(p);
+        let room = all.iter().map(room).fold(f64::INFINITY, f64::min);
+        Ok(Some(Least {
+            between: self.scene.names(&self.scene.pairs[pair]).map(String::from),
+            met,
+            time,
+            // `free` has shown that there is room
+            bound: margin + room.max(0.0).min(met - margin),
+            margin,
+            proof,
+            unseen: self.scene.unseen.clone(),
+        }))
+    }
+
+    /// What is wrong with a posture that touches, as an error.
+    pub fn refused(&self, which: &str, blocked: Blocked) -> Error {
+        Error::Infeasible(match blocked.pair {
+            None => {
+                format!("the pose at the {which} of the move cannot be reached; choose another one")
+            }
+            Some(p) => format!(
+                "at the {which} of the move {} are {:.4} m apart, {:.4} m are required; choose another \
+                 posture, or correct the volumes or the margin",
+                self.names(Some(p)),
+                blocked.distance,
+                self.margin(p)
+            ),
         })
     }
+}
+
+const UNREACHED: Blocked = Blocked {
+    pair: None,
+    distance: f64::NAN,
+};
+
+/// The least of samples, less a quarter of the largest second difference: no parabola through them goes
+/// lower than half of that.
+fn stated(d: &[f64]) -> f64 {
+    let bend = d.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+    let bend = bend.fold(0.0, f64::max);
+    // a distance that is not a number is kept by no comparison
+    d.iter()
+        .copied()
+        .reduce(|a, b| if b < a || b.is_nan() { b } else { a })
+        .unwrap_or(f64::NAN)
+        - 0.25 * bend
 }
 
 /// A straight line between two postures; its time runs from 0 to 1.
@@ -178,6 +311,10 @@ impl Path for Line<'_> {
         for (v, (a, b)) in v.iter_mut().zip(ends) {
             *v = (b - a).abs();
         }
+    }
+
+    fn largest(&self, joint: usize) -> f64 {
+        self.from[joint].abs().max(self.to[joint].abs())
     }
 
     fn duration(&self) -> f64 {

@@ -152,6 +152,11 @@ impl Path for Leg {
         }
     }
 
+    fn largest(&self, joint: usize) -> f64 {
+        let [low, high] = self.profiles[joint].range(0.0, self.duration);
+        low.abs().max(high.abs())
+    }
+
     fn duration(&self) -> f64 {
         self.duration
     }
@@ -210,7 +215,8 @@ impl Move {
     ///
     /// let plant = Plant::load("planar2")?;
     /// let (from, to) = (State::rest(&[0.0, 0.5]), State::rest(&[0.4, -0.5]));
-    /// let there = Move::plan(&plant, &from, &to, &Settings::default(), None)?;
+    /// let scene = plant.scene()?; // what it must not touch, where its files say it
+    /// let there = Move::plan(&plant, &from, &to, &Settings::default(), scene.as_deref())?;
     /// let samples = there.sample(1000.0)?; // columns t, q, qd, qdd
     /// assert_eq!(samples.q[1][0], 0.5);
     /// # Ok::<(), excite::Error>(())
@@ -388,6 +394,11 @@ impl Path for Move {
             }
             start += leg.duration;
         }
+    }
+
+    fn largest(&self, joint: usize) -> f64 {
+        let all = self.legs.iter().map(|leg| leg.largest(joint));
+        all.fold(0.0, f64::max)
     }
 
     fn duration(&self) -> f64 {

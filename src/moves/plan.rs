@@ -47,14 +47,12 @@ pub fn plan(
     let (full, warnings) = limits(plant)?;
     inside(plant, &full, "start", from)?;
     inside(plant, &full, "target", to)?;
-    // the volumes of a closed chain do not follow from its coordinates here
-    let scene = scene.filter(|_| plant.mechanism().is_none());
     let planner = Planner {
         plant,
         low: scaled(&full, settings.scale),
         full,
         settings,
-        guard: scene.map(|s| Guard::new(plant.robot(), s)),
+        guard: scene.map(|s| Guard::new(plant, s)),
     };
     planner.untouched("start", &from.q)?;
     planner.untouched("target", &to.q)?;
@@ -72,14 +70,7 @@ impl Planner<'_> {
         };
         match guard.touching(q) {
             None => Ok(()),
-            Some(b) => {
-                let [one, other] = guard.names(b.pair);
-                Err(Error::Infeasible(format!(
-                    "at the {which} of the move {one} and {other} are {:.4} m apart, {:.4} m are \
-                     required; choose another posture, or correct the volumes or the margin",
-                    b.distance, guard.scene.margin
-                )))
-            }
+            Some(blocked) => Err(guard.refused(which, blocked)),
         }
     }
 
@@ -240,9 +231,11 @@ impl Planner<'_> {
         let total: usize = found.blocked.iter().map(|(_, count)| count).sum();
         let pairs: Vec<String> = (found.blocked.iter().take(NAMED))
             .map(|(pair, count)| {
-                let [one, other] = guard.names(*pair);
                 let share = 100.0 * *count as f64 / total.max(1) as f64;
-                format!("{one} and {other} ({share:.0} % of the blocked lines)")
+                format!(
+                    "{} ({share:.0} % of the blocked lines)",
+                    guard.names(Some(*pair))
+                )
             })
             .collect();
         Error::Infeasible(format!(
@@ -267,8 +260,11 @@ impl Planner<'_> {
             (Refusal::Motion(e), _) => e,
             (Refusal::Load(most), _) => most.what,
             (Refusal::Blocked(b), Some(guard)) => {
-                let [one, other] = guard.names(b.pair);
-                format!("{one} and {other} come as close as {:.4} m", b.distance)
+                format!(
+                    "in the way: {}, at {:.4} m",
+                    guard.names(b.pair),
+                    b.distance
+                )
             }
             (Refusal::Blocked(_), None) => "something is in the way".into(),
         };
@@ -329,7 +325,9 @@ impl Planner<'_> {
             warnings: Vec::new(),
             legs: whole,
         };
-        found.clearance = self.guard.as_ref().and_then(|guard| guard.least(&found));
+        if let Some(guard) = &self.guard {
+            found.clearance = guard.least(&found)?;
+        }
         Ok(found)
     }
 }

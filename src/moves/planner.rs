@@ -58,7 +58,9 @@ impl Search<'_, '_> {
         match self.guard.free(&Line { from, to }) {
             Ok(()) => true,
             Err(blocked) => {
-                self.counts[blocked.pair] += 1;
+                if let Some(count) = blocked.pair.and_then(|p| self.counts.get_mut(p)) {
+                    *count += 1;
+                }
                 false
             }
         }

@@ -1,10 +1,10 @@
 //! Moves against their limits, against another planner, and among walls; the rehearsal table.
 
-use excite::collision::Shape;
-use excite::collision::scene::{Obstacle, Scene, Volume, poses};
+use excite::collision::scene::{Obstacle, Pair, Partner, Scene, Volume, poses};
 use excite::moves::{Move, SPEEDS, Settings, State, rehearse};
 use excite::robot::JointTerm;
 use excite::robot::{Limits, Robot};
+use excite::solid::Shape;
 use excite::trajectory::{Basis, Ends, Fourier, Series, Trajectory, extrema};
 use excite::{Error, Plant};
 use nalgebra::Vector3;
@@ -229,7 +229,13 @@ fn among(balls: &[(&str, [f64; 2], f64)]) -> (Plant, Scene) {
         margin: 0.02,
         ..Scene::default()
     };
-    scene.pairs = scene.all_pairs(plant.robot(), |_, _| false);
+    for volume in 0..2 {
+        scene.pairs.extend((0..balls.len()).map(|o| Pair {
+            volume,
+            partner: Partner::Obstacle(o),
+            margin: 0.02,
+        }));
+    }
     (plant, scene)
 }
 
