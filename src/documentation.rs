@@ -8,6 +8,7 @@
 //! | [`parallel`] | parallel robots |
 //! | [`identification`] | from a log to a model |
 //! | [`load`] | mass, centre of mass and inertia of a load |
+//! | [`moves`] | the way to the start of a motion and back; a motion at several speeds |
 //! | [`simulation`] | the simulated robot |
 //! | [`run`] | files for controllers, and the programs that play them |
 //! | [`diagnosis`] | how to read a diagnosis, and what to do next |
@@ -34,6 +35,7 @@ macro_rules! documents {
             #[doc = "[limits.md]: crate::documentation::limits"]
             #[doc = "[load.md]: crate::documentation::load"]
             #[doc = "[method.md]: crate::documentation::method"]
+            #[doc = "[moves.md]: crate::documentation::moves"]
             #[doc = "[notation.md]: crate::documentation::notation"]
             #[doc = "[parallel.md]: crate::documentation::parallel"]
             #[doc = "[results.md]: crate::documentation::results"]
@@ -59,6 +61,7 @@ documents! {
     limits "limits"
     load "load"
     method "method"
+    moves "moves"
     notation "notation"
     parallel "parallel"
     results "results"

@@ -84,6 +84,7 @@ pub fn run(args: Args) -> Result<()> {
         scale: args.scale,
         tries: args.tries,
         seed: args.seed,
+        rate: Some(args.rate),
     };
     let folder = Folder::new(&args.output, &FILES, args.force)?;
     let park = args.to.as_ref().unwrap_or(&args.from);
@@ -114,7 +115,6 @@ pub fn run(args: Args) -> Result<()> {
         "robot": plant.name(),
         "robot_hash": plant.robot().hash,
         "joints": plant.coordinate_names(),
-        "rate": args.rate,
         "settings": settings,
         "moves": moves,
         "warnings": warnings,

@@ -143,12 +143,8 @@ fn most(plant: &Plant, x: &Samples, share: f64) -> Result<Most> {
 /// The leg as slow as the limits ask for that were sampled: the factor is found by bisection to 1 %.
 /// Otherwise the limit that no slowness keeps, because the postures alone exceed it. A leg that may not
 /// be slowed (its ends move) is taken as it is or not at all.
-pub fn bearable(
-    plant: &Plant,
-    leg: &Leg,
-    may_slow: bool,
-) -> Result<std::result::Result<Leg, Most>> {
-    let x = samples(leg);
+pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
+    let (x, may_slow) = (samples(leg), leg.resting);
     let share = if may_slow { leg.scale } else { 1.0 };
     let first = most(plant, &x, share)?;
     if first.kept() {

@@ -95,6 +95,9 @@ pub struct Settings {
     pub tries: usize,
     /// seed of the planner
     pub seed: u64,
+    /// samples a second, Hz, of which a move lasts a whole number: its longest leg between postures at rest
+    /// is made that much slower; `None`: as fast as it can be
+    pub rate: Option<f64>,
 }
 
 impl Default for Settings {
@@ -103,6 +106,7 @@ impl Default for Settings {
             scale: 0.2,
             tries: 3000,
             seed: 1,
+            rate: None,
         }
     }
 }
@@ -116,16 +120,19 @@ struct Leg {
     slowed: f64,
     /// share of the limits that is used
     scale: f64,
+    /// whether both ends are at rest
+    resting: bool,
 }
 
 impl Leg {
-    fn new(profiles: Vec<Profile>, scale: f64) -> Self {
+    fn new(profiles: Vec<Profile>, scale: f64, resting: bool) -> Self {
         let duration = profiles.iter().map(|p| p.duration).fold(0.0, f64::max);
         Leg {
             profiles,
             duration,
             slowed: 1.0,
             scale,
+            resting,
         }
     }
 
@@ -134,7 +141,7 @@ impl Leg {
             profiles: self.profiles.iter().map(|p| p.stretched(factor)).collect(),
             duration: self.duration * factor,
             slowed: self.slowed * factor,
-            scale: self.scale,
+            ..*self
         }
     }
 }
@@ -408,6 +415,9 @@ impl Path for Move {
 
 /// Whether settings can be used.
 fn check(settings: &Settings) -> Result<()> {
+    if let Some(rate) = settings.rate {
+        times(0.0, rate)?;
+    }
     if settings.scale > 0.0 && settings.scale <= 1.0 {
         return Ok(());
     }

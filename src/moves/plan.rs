@@ -14,6 +14,8 @@ use crate::robot::{Limits, Motion};
 
 /// Shares of the limits, relative to the one asked for, that legs with an end in motion are tried with.
 const SHARES: [f64; 8] = [1.0, 0.5, 0.25, 1.5, 2.0, 3.0, 5.0, 10.0];
+/// Times that the duration is adapted to the samples.
+const ALIGNED: usize = 4;
 /// Pairs that a message names.
 const NAMED: usize = 3;
 
@@ -56,7 +58,8 @@ pub fn plan(
     };
     planner.untouched("start", &from.q)?;
     planner.untouched("target", &to.q)?;
-    let (legs, tries) = planner.legs(from, to)?;
+    let (mut legs, tries) = planner.legs(from, to)?;
+    planner.align(&mut legs)?;
     let mut found = planner.assembled(from, to, legs, tries)?;
     found.warnings = warnings;
     Ok(found)
@@ -75,19 +78,23 @@ impl Planner<'_> {
     }
 
     /// A leg that keeps all limits and touches nothing.
-    fn accepted(&self, leg: Leg, may_slow: bool) -> Result<Result<Leg, Refusal>> {
+    fn accepted(&self, leg: Leg) -> Result<Result<Leg, Refusal>> {
         if let Some(guard) = &self.guard
             && let Err(blocked) = guard.free(&leg)
         {
             return Ok(Err(Refusal::Blocked(blocked)));
         }
-        Ok(bearable(self.plant, &leg, may_slow)?.map_err(Refusal::Load))
+        Ok(bearable(self.plant, &leg)?.map_err(Refusal::Load))
     }
 
     /// From one posture at rest to another, each joint by its own fastest motion.
     fn resting(&self, from: &[f64], to: &[f64]) -> Result<Result<Leg, Refusal>> {
-        let leg = Leg::new(rest::fastest(from, to, &self.low), self.settings.scale);
-        self.accepted(leg, true)
+        let leg = Leg::new(
+            rest::fastest(from, to, &self.low),
+            self.settings.scale,
+            true,
+        );
+        self.accepted(leg)
     }
 
     /// A leg one of whose ends moves, with the share of the limits nearest to the one asked for.
@@ -125,7 +132,7 @@ impl Planner<'_> {
             Ok(profiles) => profiles,
             Err(e) => return Ok(Err(Refusal::Motion(e))),
         };
-        let leg = self.accepted(Leg::new(profiles, scale), false)?;
+        let leg = self.accepted(Leg::new(profiles, scale, false))?;
         Ok(leg.map(|leg| (leg, from, to)))
     }
 
@@ -178,8 +185,35 @@ impl Planner<'_> {
         if let Ok(leg) = self.resting(from, to)? {
             return Ok(leg);
         }
-        let leg = Leg::new(rest::straight(from, to, &self.low), self.settings.scale);
-        bearable(self.plant, &leg, true)?.map_err(|most| self.unbearable(&most))
+        let leg = Leg::new(
+            rest::straight(from, to, &self.low),
+            self.settings.scale,
+            true,
+        );
+        bearable(self.plant, &leg)?.map_err(|most| self.unbearable(&most))
+    }
+
+    /// Makes the longest leg at rest slower, so that the whole lasts a whole number of steps.
+    fn align(&self, legs: &mut [Leg]) -> Result<()> {
+        let Some(rate) = self.settings.rate else {
+            return Ok(());
+        };
+        // torques may change with the speed, and ask for more time
+        for _ in 0..ALIGNED {
+            let total: f64 = legs.iter().map(|leg| leg.duration).sum();
+            let extra = (total * rate - 1e-6).ceil() / rate - total;
+            let resting = legs.iter_mut().filter(|leg| leg.resting);
+            let longest = resting.max_by(|a, b| a.duration.total_cmp(&b.duration));
+            let Some(leg) = longest.filter(|leg| extra > 1e-12 && leg.duration > 0.0) else {
+                return Ok(());
+            };
+            let slower = Leg {
+                slowed: leg.slowed,
+                ..leg.stretched(1.0 + extra / leg.duration)
+            };
+            *leg = bearable(self.plant, &slower)?.map_err(|most| self.unbearable(&most))?;
+        }
+        Ok(())
     }
 
     /// Postures of a way between two postures, both included, and how many were tried.
@@ -286,6 +320,7 @@ impl Planner<'_> {
             true => vec![Leg::new(
                 from.q.iter().map(still).collect(),
                 self.settings.scale,
+                true,
             )],
             false => legs.clone(),
         };

@@ -264,9 +264,12 @@ fn a_way_round_a_ball_is_found_and_proven() {
     for scale in [0.2, 1.0] {
         let settings = Settings {
             scale,
+            rate: Some(250.0),
             ..Settings::default()
         };
         let m = Move::plan(&plant, &from, &to, &settings, Some(&scene)).unwrap();
+        let steps = m.duration * 250.0;
+        assert!((steps - steps.round()).abs() < 1e-6 && m.slowed == 1.0);
         assert!(
             !m.via.is_empty() && m.via.len() < 6 && m.tries > 0,
             "{:?}",

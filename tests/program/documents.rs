@@ -181,6 +181,11 @@ fn keys_of_a_serial_robots_files_are_documented() {
         at,
         "simulate planar2 d/trajectory.json --rate 100 --step 0.001 --monte-carlo 3 --output m.csv",
     );
+    excite(
+        at,
+        "move planar2 d/trajectory.json --from 0.1,-0.2 --output d",
+    );
+    excite(at, "rehearse planar2 d/trajectory.json --output d");
     excite(at, "identify log/experiment.toml --output model");
     excite(at, "diagnose log/experiment.toml --no-next --output gap");
     compare(
@@ -196,6 +201,11 @@ fn keys_of_a_serial_robots_files_are_documented() {
         &[at.join("model/report.json")],
     );
     compare("## Model: `model.json`", &[at.join("model/model.json")]);
+    compare("## Moves: `moves.json`", &[at.join("d/moves.json")]);
+    compare(
+        "## Rehearsal table: `rehearsal.json`",
+        &[at.join("d/rehearsal.json")],
+    );
     compare(
         "## Diagnosis: `diagnosis.json`",
         &[at.join("gap/diagnosis.json")],
