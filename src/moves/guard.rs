@@ -14,8 +14,14 @@ use crate::solid::Pose;
 use crate::trajectory::certificate::Proof;
 use std::collections::VecDeque;
 
-/// Distances closer to the margin than this are not told from it, m.
-const FINEST: f64 = 1e-6;
+/// Margins are kept to this, m: a motion may begin or end at its margin.
+const GIVE: f64 = 1e-4;
+/// Ends may be short of their margin by so much, m.
+const TOUCH: f64 = 1e-6;
+/// Stretches in which nothing moves farther than this are not halved, m.
+const FINEST: f64 = 1e-5;
+/// Most instants that one path is looked at.
+const LOOKS: usize = 20_000;
 /// How closely the least clearance of a tree is bounded.
 const CLOSELY: Fineness = Fineness {
     stretches: 60,
@@ -44,7 +50,7 @@ pub struct Least {
     pub met: f64,
     /// when, s
     pub time: f64,
-    /// the room of no pair is at any time less than this, m
+    /// no pair is at any time nearer to its margin than `bound - margin`, m
     pub bound: f64,
     /// least distance that is allowed, m
     pub margin: f64,
@@ -95,6 +101,11 @@ impl<'a> Guard<'a> {
         self.scene.pairs[pair].margin
     }
 
+    /// What a path must keep.
+    fn kept(&self, pair: usize) -> f64 {
+        self.margin(pair) - GIVE
+    }
+
     /// Distances of some pairs in a posture.
     fn distances(&self, x: &[f64], pairs: &[usize], at: &mut Vec<Pose>) -> Result<Vec<f64>> {
         let robot = self.plant.robot();
@@ -115,7 +126,7 @@ impl<'a> Guard<'a> {
         let room = |p: usize| d[p] - self.margin(p);
         let least = (0..d.len()).min_by(|a, b| room(*a).total_cmp(&room(*b)))?;
         // a distance that is not a number is no distance
-        (!(room(least) >= 0.0)).then_some(Blocked {
+        (!(room(least) >= -TOUCH)).then_some(Blocked {
             pair: Some(least),
             distance: d[least],
         })
@@ -130,7 +141,7 @@ impl<'a> Guard<'a> {
             None => self.proven(path),
             Some(_) => {
                 let along = self.along(path).map_err(|_| UNREACHED)?;
-                let short = |p: &usize| !(stated(&along[*p]) >= self.margin(*p));
+                let short = |p: &usize| !(stated(&along[*p]) >= self.kept(*p));
                 match (0..along.len()).find(short) {
                     None => Ok(()),
                     Some(p) => Err(Blocked {
@@ -157,7 +168,7 @@ impl<'a> Guard<'a> {
         let mut look = |t: f64, pairs: &[usize]| -> Result<Vec<f64>, Blocked> {
             path.position(t, &mut q);
             let d = self.distances(&q, pairs, &mut at).map_err(|_| UNREACHED)?;
-            match (0..d.len()).find(|&k| !(d[k] >= self.margin(pairs[k]))) {
+            match (0..d.len()).find(|&k| !(d[k] >= self.kept(pairs[k]))) {
                 None => Ok(d),
                 Some(k) => Err(Blocked {
                     pair: Some(pairs[k]),
@@ -168,16 +179,17 @@ impl<'a> Guard<'a> {
         let all: Vec<usize> = (0..self.scene.pairs.len()).collect();
         let end = path.duration();
         let (first, last) = (look(0.0, &all)?, look(end, &all)?);
+        let mut looks = 0;
         let mut queue = VecDeque::from([(0.0, end, all, first, last)]);
         while let Some((from, h, pairs, d0, d1)) = queue.pop_front() {
             path.speed(from, from + h, &mut v);
             let mut open = Vec::new();
             for (k, &pair) in pairs.iter().enumerate() {
                 let rate: f64 = v.iter().zip(&reaches[pair]).map(|(v, r)| v * r).sum();
-                if 0.5 * (d0[k] + d1[k] - rate * h) >= self.margin(pair) {
+                if 0.5 * (d0[k] + d1[k] - rate * h) >= self.kept(pair) {
                     continue;
                 }
-                if !(rate * h >= FINEST) {
+                if !(rate * h >= FINEST) || looks > LOOKS {
                     return Err(Blocked {
                         pair: Some(pair),
                         distance: d0[k].min(d1[k]),
@@ -191,6 +203,7 @@ impl<'a> Guard<'a> {
             let pick = |d: &[f64]| -> Vec<f64> { open.iter().map(|&k| d[k]).collect() };
             let left: Vec<usize> = open.iter().map(|&k| pairs[k]).collect();
             let middle = from + 0.5 * h;
+            looks += 1;
             let d = look(middle, &left)?;
             queue.push_back((from, 0.5 * h, left.clone(), pick(&d0), d.clone()));
             queue.push_back((middle, 0.5 * h, left, d, pick(&d1)));
@@ -247,8 +260,8 @@ impl<'a> Guard<'a> {
             between: self.scene.names(&self.scene.pairs[pair]).map(String::from),
             met,
             time,
-            // `free` has shown that there is room
-            bound: margin + room.max(0.0).min(met - margin),
+            // `free` has shown that there is that room
+            bound: margin + room.max(-GIVE).min(met - margin),
             margin,
             proof,
             unseen: self.scene.unseen.clone(),

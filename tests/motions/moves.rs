@@ -304,7 +304,7 @@ fn a_way_round_a_ball_is_found_and_proven() {
         check(&plant, &limits(&plant), &m, 2000.0);
         let found = m.clearance.as_ref().unwrap();
         let least = sampled(&plant, &scene, &m);
-        assert!(found.bound >= 0.02 - 1e-12 && found.bound <= found.met);
+        assert!(found.bound >= 0.02 - 1e-4 && found.bound <= found.met);
         assert!(
             least >= found.bound && least - found.bound < 5e-3,
             "{least} {found:?}"
