@@ -66,7 +66,7 @@ fn table(found: &Rehearsal) -> String {
     for s in &found.speeds {
         let _ = writeln!(
             out,
-            "{} at {:.0} % speed: {} s, {} samples at {} Hz, {} bytes",
+            "{} at {:.0} % speed: {:.3} s, {} samples at {} Hz, {} bytes",
             found.robot,
             100.0 * s.speed,
             s.seconds,

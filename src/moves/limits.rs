@@ -7,10 +7,10 @@ use crate::robot::{Limits, Motion};
 
 /// Velocity of a coordinate that states none: rad/s, m/s.
 pub const VELOCITY: [f64; 2] = [1.0, 0.25];
-/// Time in which a coordinate without acceleration limit reaches its velocity limit, s.
-pub const RISE_VELOCITY: f64 = 0.2;
-/// Time in which a coordinate without jerk limit reaches its acceleration limit, s.
-pub const RISE_ACCELERATION: f64 = 0.1;
+/// How often a second a coordinate without acceleration limit could reach its velocity limit.
+pub const RISES_OF_VELOCITY: f64 = 5.0;
+/// How often a second a coordinate without jerk limit could reach its acceleration limit.
+pub const RISES_OF_ACCELERATION: f64 = 10.0;
 /// Share of a limit by which rounding may exceed it.
 pub const SLACK: f64 = 1e-9;
 
@@ -36,14 +36,14 @@ pub fn limits(plant: &Plant) -> Result<(Vec<Limits>, Vec<Warning>)> {
             }
         };
         assume("velocity", &format!("{unit}/s"), &mut l.velocity, velocity);
-        let rise = l.velocity / RISE_VELOCITY;
+        let rise = l.velocity * RISES_OF_VELOCITY;
         assume(
             "acceleration",
             &format!("{unit}/s^2"),
             &mut l.acceleration,
             rise,
         );
-        let rise = l.acceleration / RISE_ACCELERATION;
+        let rise = l.acceleration * RISES_OF_ACCELERATION;
         assume("jerk", &format!("{unit}/s^3"), &mut l.jerk, rise);
         if !(l.velocity > 0.0 && l.acceleration > 0.0 && l.jerk > 0.0) {
             return Err(Error::Argument(format!(
