@@ -1,7 +1,7 @@
 //! What a leg asks of the actuators, sampled: torques, and of closed chains the motion of the actuators
 //! and the limits of the pose.
 
-use super::Leg;
+use super::leg::Leg;
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::plant::Plant;

@@ -9,6 +9,7 @@
 //! | file | content |
 //! |---|---|
 //! | `profile` | piecewise cubics: extrema, stretching in time |
+//! | `leg` | a part of a move between two states |
 //! | `rest` | the fastest leg between two postures, in closed form |
 //! | `moving` | legs that begin or end in motion |
 //! | `limits` | what a move may use of the limits |
@@ -19,6 +20,7 @@
 //! | `rehearsal` | a motion at several speeds: torques, power, samples, bytes |
 
 mod guard;
+mod leg;
 mod limits;
 mod load;
 mod moving;
@@ -39,7 +41,7 @@ use crate::error::{Error, Result, Warning};
 use crate::plant::Plant;
 use crate::trajectory::Fourier;
 use crate::trajectory::samples::{Samples, times, write_along};
-use profile::Profile;
+use leg::Leg;
 
 /// Position, velocity and acceleration of all coordinates.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -108,64 +110,6 @@ impl Default for Settings {
             seed: 1,
             rate: None,
         }
-    }
-}
-
-/// A part of a move between two states.
-#[derive(Debug, Clone, PartialEq)]
-struct Leg {
-    profiles: Vec<Profile>,
-    duration: f64,
-    /// how much slower than the share of the limits allows, for the sake of torques; 1: not slower
-    slowed: f64,
-    /// share of the limits that is used
-    scale: f64,
-    /// whether both ends are at rest
-    resting: bool,
-}
-
-impl Leg {
-    fn new(profiles: Vec<Profile>, scale: f64, resting: bool) -> Self {
-        let duration = profiles.iter().map(|p| p.duration).fold(0.0, f64::max);
-        Leg {
-            profiles,
-            duration,
-            slowed: 1.0,
-            scale,
-            resting,
-        }
-    }
-
-    fn stretched(&self, factor: f64) -> Self {
-        Leg {
-            profiles: self.profiles.iter().map(|p| p.stretched(factor)).collect(),
-            duration: self.duration * factor,
-            slowed: self.slowed * factor,
-            ..*self
-        }
-    }
-}
-
-impl Path for Leg {
-    fn position(&self, t: f64, q: &mut [f64]) {
-        for (q, p) in q.iter_mut().zip(&self.profiles) {
-            *q = p.at(t)[0];
-        }
-    }
-
-    fn speed(&self, from: f64, to: f64, v: &mut [f64]) {
-        for (v, p) in v.iter_mut().zip(&self.profiles) {
-            *v = p.speed(from, to);
-        }
-    }
-
-    fn largest(&self, joint: usize) -> f64 {
-        let [low, high] = self.profiles[joint].range(0.0, self.duration);
-        low.abs().max(high.abs())
-    }
-
-    fn duration(&self) -> f64 {
-        self.duration
     }
 }
 

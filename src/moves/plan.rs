@@ -1,12 +1,13 @@
 //! A whole move: the direct leg where it is free, otherwise legs through postures at rest.
 
 use super::guard::{Blocked, Guard, Line};
+use super::leg::Leg;
 use super::limits::{inside, limits, raised, scaled};
 use super::load::{Most, bearable, peaks};
 use super::moving::{braked, through};
 use super::planner::{Found, search};
 use super::profile::Profile;
-use super::{JointPeaks, Leg, Move, Settings, State, check, rest};
+use super::{JointPeaks, Move, Settings, State, check, rest};
 use crate::collision::scene::Scene;
 use crate::error::{Error, Result};
 use crate::plant::Plant;

@@ -594,3 +594,29 @@ fn the_rehearsal_balances_power_and_counts_bytes() {
             .is_argument()
     );
 }
+
+#[test]
+fn continuous_ratings_are_read_and_written() {
+    let b = excite::robot::bundled::list()
+        .iter()
+        .find(|b| b.name == "planar2")
+        .unwrap();
+    let with = |line: &str| b.toml.replacen("gear_ratio = 50.0", line, 1);
+    let text = with("continuous_torque = 12.5\ncontinuous_power = 80.0");
+    let robot = Robot::from_toml_str(&text, b.urdf, "planar2").unwrap();
+    let ratings = |r: &Robot| -> Vec<[Option<f64>; 2]> {
+        let joints = r.joints.iter();
+        joints
+            .map(|j| [j.continuous_torque, j.continuous_power])
+            .collect()
+    };
+    assert_eq!(ratings(&robot), [[Some(12.5), Some(80.0)], [None, None]]);
+    let again = robot.to_toml_template("planar2.urdf");
+    let again = Robot::from_toml_str(&again, b.urdf, "planar2").unwrap();
+    assert_eq!(ratings(&again), ratings(&robot));
+    for line in ["continuous_torque = -1.0", "continuous_power = inf"] {
+        let error = Robot::from_toml_str(&with(line), b.urdf, "planar2").unwrap_err();
+        let key = line.split(' ').next().unwrap();
+        assert!(error.to_string().contains(key), "{error}");
+    }
+}

@@ -1,0 +1,66 @@
+//! A part of a move, from one state to another.
+
+use super::profile::Profile;
+use crate::collision::clearance::Path;
+
+/// A part of a move between two states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Leg {
+    /// one a coordinate
+    pub profiles: Vec<Profile>,
+    /// s
+    pub duration: f64,
+    /// how much slower than the share of the limits allows, for the sake of torques; 1: not slower
+    pub slowed: f64,
+    /// share of the limits that is used
+    pub scale: f64,
+    /// whether both ends are at rest
+    pub resting: bool,
+}
+
+impl Leg {
+    /// Of its coordinates; it lasts as long as the longest of them.
+    pub fn new(profiles: Vec<Profile>, scale: f64, resting: bool) -> Self {
+        let duration = profiles.iter().map(|p| p.duration).fold(0.0, f64::max);
+        Leg {
+            profiles,
+            duration,
+            slowed: 1.0,
+            scale,
+            resting,
+        }
+    }
+
+    /// The same positions, `factor` times as slow.
+    pub fn stretched(&self, factor: f64) -> Self {
+        Leg {
+            profiles: self.profiles.iter().map(|p| p.stretched(factor)).collect(),
+            duration: self.duration * factor,
+            slowed: self.slowed * factor,
+            ..*self
+        }
+    }
+}
+
+impl Path for Leg {
+    fn position(&self, t: f64, q: &mut [f64]) {
+        for (q, p) in q.iter_mut().zip(&self.profiles) {
+            *q = p.at(t)[0];
+        }
+    }
+
+    fn speed(&self, from: f64, to: f64, v: &mut [f64]) {
+        for (v, p) in v.iter_mut().zip(&self.profiles) {
+            *v = p.speed(from, to);
+        }
+    }
+
+    fn largest(&self, joint: usize) -> f64 {
+        let [low, high] = self.profiles[joint].range(0.0, self.duration);
+        low.abs().max(high.abs())
+    }
+
+    fn duration(&self) -> f64 {
+        self.duration
+    }
+}
