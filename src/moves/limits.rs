@@ -1,7 +1,7 @@
 //! What a move may use of the limits, and which limits had to be assumed.
 
 use super::State;
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, number};
 use crate::plant::Plant;
 use crate::robot::{Limits, Motion};
 
@@ -32,7 +32,7 @@ pub fn limits(plant: &Plant) -> Result<(Vec<Limits>, Vec<Warning>)> {
         let mut assume = |what: &str, unit: &str, value: &mut f64, default: f64| {
             if *value == f64::INFINITY {
                 *value = default;
-                assumed.push(format!("{what} {default} {unit}"));
+                assumed.push(format!("{what} {} {unit}", number(default)));
             }
         };
         assume("velocity", &format!("{unit}/s"), &mut l.velocity, velocity);
@@ -131,11 +131,24 @@ pub fn inside(plant: &Plant, limits: &[Limits], which: &str, state: &State) -> R
         let fault = if !(q.is_finite() && v.is_finite() && w.is_finite()) {
             "not finite".to_string()
         } else if q < a - slack || q > b + slack {
-            format!("at {q}, outside its position limits [{a}, {b}]")
+            format!(
+                "at {}, outside its position limits [{}, {}]",
+                number(q),
+                number(a),
+                number(b)
+            )
         } else if v.abs() > l.velocity * slight {
-            format!("at velocity {v}, above its limit {}", l.velocity)
+            format!(
+                "at velocity {}, above its limit {}",
+                number(v),
+                number(l.velocity)
+            )
         } else if w.abs() > l.acceleration * slight {
-            format!("at acceleration {w}, above its limit {}", l.acceleration)
+            format!(
+                "at acceleration {}, above its limit {}",
+                number(w),
+                number(l.acceleration)
+            )
         } else {
             continue;
         };
