@@ -117,8 +117,8 @@ mod tests {
                 let peaks = x.peaks();
                 assert!(peaks.velocity <= v * (1.0 + 1e-9));
                 assert!(peaks.acceleration <= a * (1.0 + 1e-9) && peaks.jerk <= j * (1.0 + 1e-9));
-                assert!(peaks.position[0] >= 0.2 - 1e-12);
-                assert!(peaks.position[1] <= 0.2 + distance * (1.0 + 1e-12));
+                assert!(peaks.position[0] >= 0.2 - 1e-15);
+                assert!(peaks.position[1] <= 0.2 + distance * (1.0 + 1e-12) + 1e-15);
                 // nothing to gain: one of the limits of the velocity, or none of the pauses, is used
                 let used = peaks.velocity / v > 1.0 - 1e-9 || p[3].0 < 1e-9 * t;
                 assert!(used, "{distance} {v} {a} {j}: {p:?}");
