@@ -1,11 +1,11 @@
 //! How far a controller leaves the motion between the points that are sent: the bounds, against what interpolation does.
 
 use super::{Folder, altered, designed, motion};
-use excite::Robot;
 use excite::controller::{AIM, Course, Interpolation, Leg};
+use excite::moves::{Move, Settings};
 use excite::trajectory::samples::times;
-use excite::trajectory::transition::{approach, retreat};
 use excite::trajectory::{Fourier, Samples, Series, Trajectory};
+use excite::{Plant, Robot};
 use rand::Rng;
 
 const ALL: [Interpolation; 4] = [
@@ -85,14 +85,23 @@ fn bounds_hold_for_random_series() {
 }
 
 /// A start and an end in motion, with jerk-limited moves in front of it and behind it.
+fn moves(trajectory: &Trajectory, rate: f64) -> [Move; 2] {
+    let plant = Plant::load("planar2").unwrap();
+    let settings = Settings {
+        scale: 1.0,
+        rate: Some(rate),
+        ..Settings::default()
+    };
+    let motion = &trajectory.fourier;
+    let there = Move::approach(&plant, &[0.3, -0.2], motion, &settings, None).unwrap();
+    let back = Move::retreat(&plant, motion, &[0.1, 0.4], &settings, None).unwrap();
+    [there, back]
+}
+
+/// The same as they are sampled.
 fn with_moves(trajectory: &Trajectory, rate: f64) -> (Leg, Leg) {
-    let robot = Robot::load("planar2").unwrap();
-    let there = approach(&robot, &[0.3, -0.2], &trajectory.fourier, rate).unwrap();
-    let back = retreat(&robot, &trajectory.fourier, &[0.1, 0.4], rate).unwrap();
-    (
-        Leg::new(there.samples).unwrap(),
-        Leg::new(back.samples).unwrap(),
-    )
+    let [there, back] = moves(trajectory, rate).map(|m| Leg::new(m.sample(rate).unwrap()).unwrap());
+    (there, back)
 }
 
 /// The designed motion from a quarter of its period on: it starts and ends while it moves.
@@ -147,14 +156,11 @@ fn moves_are_in_the_file() {
     let folder = Folder::new();
     let path = altered(&folder, "planar2", shifted);
     let trajectory = Trajectory::read(&path).unwrap();
-    let robot = Robot::load("planar2").unwrap();
-    let there = approach(&robot, &[0.3, -0.2], &trajectory.fourier, 500.0).unwrap();
-    let back = retreat(&robot, &trajectory.fourier, &[0.1, 0.4], 500.0).unwrap();
-    there
-        .samples
-        .write(folder.path("there.csv"), false)
-        .unwrap();
-    back.samples.write(folder.path("back.csv"), false).unwrap();
+    let [there, back] = moves(&trajectory, 500.0);
+    for (m, file) in [(&there, "there.csv"), (&back, "back.csv")] {
+        let samples = m.sample(500.0).unwrap();
+        samples.write(folder.path(file), false).unwrap();
+    }
     let line = "--format ros2 --rate 500 --approach there.csv --return back.csv";
     let said = folder.export(&path, line, "a.yaml");
     assert!(
