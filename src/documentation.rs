@@ -8,6 +8,7 @@
 //! | [`parallel`] | parallel robots |
 //! | [`identification`] | from a log to a model |
 //! | [`load`] | mass, centre of mass and inertia of a load |
+//! | [`collisions`] | what a motion must not touch, how it keeps clear, and how that is proven |
 //! | [`moves`] | the way to the start of a motion and back; a motion at several speeds |
 //! | [`simulation`] | the simulated robot |
 //! | [`run`] | files for controllers, and the programs that play them |
@@ -25,6 +26,7 @@ macro_rules! documents {
     ($($name:ident $file:literal)*) => {
         $(
             #[doc = "[benchmarks.md]: crate::documentation::benchmarks"]
+            #[doc = "[collisions.md]: crate::documentation::collisions"]
             #[doc = "[compare.md]: crate::documentation::compare"]
             #[doc = "[design.md]: crate::documentation::design"]
             #[doc = "[diagnosis.md]: crate::documentation::diagnosis"]
@@ -51,6 +53,7 @@ macro_rules! documents {
 
 documents! {
     benchmarks "benchmarks"
+    collisions "collisions"
     compare "compare"
     design "design"
     diagnosis "diagnosis"

@@ -78,8 +78,9 @@ pub struct Args {
     /// parallel robots, whose parameters differ by orders of magnitude in size]
     #[arg(long, value_parser = named::<Condition>)]
     condition: Option<Condition>,
-    /// Fraction of every limit that may be used
-    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+    /// Fraction of every limit that may be used; the rest is for the overshoot of the controller and
+    /// for what the model does not know. 1: the limits of the robot file in full
+    #[arg(long, default_value_t = 0.9, allow_negative_numbers = true)]
     derate: f64,
     /// Rate of samples.csv in Hz
     #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]

@@ -53,7 +53,7 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
             shape: shape.clone(),
         }));
     }
-    if scene.volumes.is_empty() {
+    if scene.volumes.is_empty() && geometry.keep_in.is_empty() {
         return Ok(None);
     }
     scene.bodies_unseen(robot);
@@ -296,8 +296,16 @@ impl Scene {
                 self.pairs.iter().map(room).collect()
             })
             .collect();
-        let never: Vec<bool> = (0..self.pairs.len())
-            .map(|p| rooms.iter().all(|r| r[p] < 0.0))
+        // what stands around can be too near for ever only of a body that the base carries
+        let may_stay = |pair: &Pair| match pair.partner {
+            Partner::Volume(_) => true,
+            Partner::Obstacle(_) => {
+                let body = self.volumes[pair.volume].body;
+                pair.margin > 0.0 && body.is_none_or(|b| robot.bodies[b].parent.is_none())
+            }
+        };
+        let never: Vec<bool> = (self.pairs.iter().enumerate())
+            .map(|(p, pair)| may_stay(pair) && rooms.iter().all(|r| r[p] < 0.0))
             .collect();
         let mut out = LeftOuts(std::mem::take(&mut self.left_out));
         for (pair, _) in self.pairs.iter().zip(&never).filter(|(_, n)| **n) {

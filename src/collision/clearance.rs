@@ -180,7 +180,13 @@ pub fn clearances(robot: &Robot, scene: &Scene, path: &dyn Path, fine: Fineness)
             // a pair that is farther away than the nearest one is known less closely
             let slack = fine.tolerance + 0.2 * (room(found) - nearest).max(0.0);
             if bound >= found.met - slack || h <= fine.shortest || !bound.is_finite() {
-                found.bound = found.bound.min(bound);
+                // what is no number is no bound
+                let known = if bound.is_nan() {
+                    f64::NEG_INFINITY
+                } else {
+                    bound
+                };
+                found.bound = found.bound.min(known);
                 continue;
             }
             let middle = from + 0.5 * h;

@@ -145,7 +145,7 @@ fn along_tree<'a>(
     if let Some(torques) = TorqueLimits::new(robot, share) {
         all.push(Box::new(torques));
     }
-    if let Some(scene) = scene {
+    if let Some(scene) = scene.filter(|s| !s.pairs.is_empty()) {
         let clear = ClearanceLimits::new(scene, robot, basis, period, tighter);
         all.push(Box::new(clear));
     }

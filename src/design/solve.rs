@@ -291,7 +291,7 @@ impl State {
         let mut rows = task.limits.rows(x, NEAR, &mut self.work);
         let mut path_rows = here.path_rows.clone();
         for round in 1.. {
-            self.fill(task, here, hessian, damping, &rows, &path_rows, n);
+            self.fill(task, here, hessian, damping, (&rows, &path_rows));
             let mut settings = ConicSettings::fast();
             if let Some(deadline) = task.deadline {
                 let left = deadline.saturating_duration_since(Instant::now());
@@ -338,11 +338,9 @@ impl State {
         here: &Point,
         hessian: Option<&Mat<f64>>,
         damping: f64,
-        rows: &[Row],
-        path_rows: &[PathRow],
-        n: usize,
+        (rows, path_rows): (&[Row], &[PathRow]),
     ) {
-        let m = task.free();
+        let (n, m) = (task.info.len(), task.free());
         let p = &mut self.problem;
         p.clear();
         for k in 0..n {

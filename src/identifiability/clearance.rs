@@ -60,10 +60,9 @@ impl Clearances {
                 .map(|k| motion.q[k * motion.count + i])
                 .collect();
             poses(plant.robot(), &plant.posture(&x)?, &mut at);
-            let all = scene
-                .pairs
-                .iter()
-                .map(|p| scene.separation(p, &at).distance);
+            // the faces of a [[keep_in]] have no margin and are no volumes
+            let all = scene.pairs.iter().filter(|p| p.margin == scene.margin);
+            let all = all.map(|p| scene.separation(p, &at).distance);
             least.push(all.fold(f64::INFINITY, f64::min));
         }
         Ok(Clearances {

@@ -164,7 +164,10 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
             all.warnings.extend(scene.warnings.iter().cloned());
             Some(Clearances::of(plant, scene, found, &motion)?)
         }
-        _ => None,
+        _ => {
+            all.warnings.extend(plant.scene_warnings());
+            None
+        }
     };
     let platform = match (plant.mechanism(), certified.mechanism) {
         (Some(m), Some(c)) => Some(Platform::of(m, &motion, c)?),

@@ -4,16 +4,19 @@ use super::Plant;
 use crate::collision::clearance::{Fineness, Path, clearances};
 use crate::collision::scene::poses;
 use crate::collision::{Scene, build};
-use crate::error::Result;
+use crate::error::{Result, Warning, WarningKind};
+use crate::robot::{Motion, Robot};
 use crate::trajectory::Fourier;
 use crate::trajectory::certificate::Proof;
 use crate::trajectory::extrema::extrema;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Random postures in which pairs are looked at.
 const POSTURES: usize = 2000;
-const SEED: u64 = 0x5ce_0e;
+const SEED: u64 = 23;
 /// A clearance counts as kept when it is short by no more than this, m.
 const TOLERANCE: f64 = 1e-9;
 
@@ -66,28 +69,40 @@ impl Plant {
     }
 
     /// Volumes, obstacles and pairs that must stay apart; `None` where the robot's files tell no volume, or
-    /// collisions are not to be looked at. Meshes are opened at the first call.
+    /// collisions are not to be looked at, and for closed chains. Meshes are opened at the first call.
     ///
     /// # Errors
     /// As [`build::scene`].
     pub fn scene(&self) -> Result<Option<Arc<Scene>>> {
-        if !self.collisions {
+        if !self.collisions || self.mechanism().is_some() {
             return Ok(None);
         }
         if let Some(known) = self.scene.get() {
             return Ok(known.clone());
         }
-        let states = self.random_states(POSTURES, SEED);
-        let postures: Vec<Vec<f64>> = (0..states.count)
-            .filter_map(|i| {
-                let x: Vec<f64> = (0..states.dof)
-                    .map(|k| states.q[k * states.count + i])
-                    .collect();
-                self.posture(&x).ok()
-            })
-            .collect();
-        let found = build::scene(self.robot(), &postures)?.map(Arc::new);
+        let found = build::scene(self.robot(), &postures(self.robot()))?.map(Arc::new);
         Ok(self.scene.get_or_init(|| found).clone())
+    }
+
+    /// Why there is no [`Plant::scene`] although the robot's files say something of volumes or surroundings.
+    pub fn scene_warnings(&self) -> Vec<Warning> {
+        let geometry = &self.robot.geometry;
+        if !self.collisions || geometry.check == Some(false) {
+            return Vec::new();
+        }
+        let mut all = match geometry.parts.is_empty() {
+            true => Vec::new(),
+            false => geometry.volumes().warnings.clone(),
+        };
+        if !geometry.obstacles.is_empty() || !geometry.keep_in.is_empty() {
+            all.push(Warning::new(
+                WarningKind::CollisionNotChecked,
+                "collisions",
+                "[[obstacle]] and [[keep_in]] have no effect here: no volume of a link is known, or this is a \
+                 closed chain",
+            ));
+        }
+        all
     }
 
     /// Positions of all joints, passive ones included, from coordinates.
@@ -161,6 +176,31 @@ impl Plant {
             )
         })))
     }
+}
+
+/// Random postures over the whole range of every joint (±π, ±0.5 m where there is none), from a fixed stream.
+fn postures(robot: &Robot) -> Vec<Vec<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let ranges: Vec<[f64; 2]> = (robot.joints.iter())
+        .map(|j| {
+            let reach = match j.motion {
+                Motion::Revolute => std::f64::consts::PI,
+                Motion::Prismatic => 0.5,
+            };
+            match j.limits.position {
+                [low, high] if low.is_finite() && high.is_finite() => [low, high],
+                [low, _] if low.is_finite() => [low, low + 2.0 * reach],
+                [_, high] if high.is_finite() => [high - 2.0 * reach, high],
+                _ => [-reach, reach],
+            }
+        })
+        .collect();
+    let one = |rng: &mut ChaCha8Rng| -> Vec<f64> {
+        let each = ranges.iter();
+        each.map(|[low, high]| low + (high - low) * rng.random_range(0.0..1.0))
+            .collect()
+    };
+    (0..POSTURES).map(|_| one(&mut rng)).collect()
 }
 
 fn named(scene: &Scene, pair: usize, [least, time, bound]: [f64; 3]) -> PairClearance {

@@ -39,7 +39,10 @@ pub struct Fit {
 
 /// Encloses a mesh by at most `most` shapes, until their volume is below `enough` times that of the hull.
 pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
-    let whole = hull(&mesh.points);
+    let whole = match mesh.points.len() > 20 * MANY {
+        true => hull_of(mesh, &extremes(&mesh.points)),
+        false => hull(&mesh.points),
+    };
     let cut = subdivided(mesh);
     let original = mesh;
     let mesh = &cut;
@@ -83,6 +86,20 @@ pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
         hull: hull_volume,
         protrusion,
     }
+}
+
+/// Hull of some of the points, with their indices in the mesh.
+fn hull_of(mesh: &Mesh, some: &[V]) -> Option<super::hull::Hull> {
+    let mut found = hull(some)?;
+    let index = |p: &V| mesh.points.iter().position(|q| q == p).unwrap_or(0);
+    let place: Vec<usize> = some.iter().map(index).collect();
+    for face in &mut found.faces {
+        *face = face.map(|i| place[i]);
+    }
+    for corner in &mut found.corners {
+        *corner = place[*corner];
+    }
+    Some(found)
 }
 
 /// Triangles and the shape that holds them.
@@ -153,14 +170,70 @@ fn corners(mesh: &Mesh, triangles: &[usize]) -> Vec<V> {
     used.sort_unstable();
     used.dedup();
     let points: Vec<V> = used.iter().map(|i| mesh.points[*i]).collect();
+    if points.len() > MANY {
+        return extremes(&points);
+    }
     match hull(&points) {
         Some(h) => h.corners.iter().map(|i| points[*i]).collect(),
         None => points,
     }
 }
 
+/// Points of a part beyond which only the outermost ones are searched with.
+const MANY: usize = 1500;
+/// Directions along which these are looked for.
+const LOOKS: usize = 400;
+
+/// The points that lie outermost along many directions.
+fn extremes(points: &[V]) -> Vec<V> {
+    let mut found: Vec<usize> = Vec::with_capacity(2 * LOOKS);
+    for k in 0..LOOKS {
+        let u = half_sphere(k, LOOKS);
+        let (mut low, mut high) = ((f64::INFINITY, 0), (f64::NEG_INFINITY, 0));
+        for (i, p) in points.iter().enumerate() {
+            let x = u.dot(p);
+            if x < low.0 {
+                low = (x, i);
+            }
+            if x > high.0 {
+                high = (x, i);
+            }
+        }
+        found.extend([low.1, high.1]);
+    }
+    found.sort_unstable();
+    found.dedup();
+    found.into_iter().map(|i| points[i]).collect()
+}
+
 /// The smallest shape found about these triangles.
 fn enclose(mesh: &Mesh, triangles: &[usize]) -> Shape {
+    let found = search(mesh, triangles);
+    // those that were not searched with, and rounding
+    let over = triangles
+        .iter()
+        .flat_map(|t| mesh.triangles[*t])
+        .map(|i| found.signed_distance(&mesh.points[i]))
+        .fold(0.0, f64::max);
+    let more = over * (1.0 + 1e-9) + 1e-12;
+    match found {
+        Shape::Box { pose, half } => Shape::Box {
+            pose,
+            half: half + V::repeat(more),
+        },
+        Shape::Capsule { from, to, radius } => Shape::Capsule {
+            from,
+            to,
+            radius: radius + more,
+        },
+        Shape::Sphere { centre, radius } => Shape::Sphere {
+            centre,
+            radius: radius + more,
+        },
+    }
+}
+
+fn search(mesh: &Mesh, triangles: &[usize]) -> Shape {
     let points = corners(mesh, triangles);
     let capsule = capsule(&points);
     let boxed = smallest_box(&points);

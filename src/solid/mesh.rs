@@ -75,7 +75,11 @@ fn text_stl(bytes: &[u8]) -> Result<Mesh, String> {
     let mut corners = Vec::with_capacity(3);
     for (row, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
-        if words.next() != Some("vertex") {
+        let first = words.next().unwrap_or_default();
+        if first.eq_ignore_ascii_case("facet") {
+            corners.clear();
+        }
+        if !first.eq_ignore_ascii_case("vertex") {
             continue;
         }
         corners.push(point(words, || format!("line {}", row + 1))?);

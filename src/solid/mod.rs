@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`shape`] | sphere, capsule, box: a convex core swept by a radius |
 //! | [`distance`] | signed distance of two shapes, witness points and normal |
-//! | [`mesh`] | triangles from STL, OBJ and COLLADA files |
+//! | [`mesh`] | triangles from STL and OBJ files |
 //! | [`hull`] | convex hull of points, its volume |
 //! | [`fit`] | capsules and boxes that enclose a mesh |
 

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod clear;
 mod conic;
 mod design;
 mod moves;

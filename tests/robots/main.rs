@@ -7,6 +7,7 @@ mod base;
 mod collision;
 mod export;
 mod files;
+mod geometry;
 mod identities;
 mod plant;
 mod rank;

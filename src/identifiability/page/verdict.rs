@@ -3,6 +3,7 @@
 use super::{KNOWN, clearance, parameters};
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::mechanism::PoseKind;
+use crate::plant::PairClearance;
 use crate::report::format::{count, percent, significant, unit_of, with_unit};
 use crate::robot::{Motion, Robot};
 use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
@@ -32,7 +33,10 @@ fn too_near(e: &Excitation) -> Option<String> {
     if c.satisfied {
         return None;
     }
-    let p = c.pairs.iter().find(|p| p.bound < p.margin)?;
+    let short = |p: &&PairClearance| p.bound.is_nan() || p.bound < p.margin;
+    let Some(p) = c.pairs.iter().find(short) else {
+        return Some("the clearance could not be proven".into());
+    };
     let [a, b] = &p.between;
     let time = with_unit(p.time, 3, "s");
     Some(match p.least < 0.0 {

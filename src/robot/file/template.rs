@@ -163,6 +163,14 @@ fn surroundings(robot: &Robot, out: &mut String) {
     let length = |x: f64| (1e4 * x).ceil() / 1e4 + 1e-4;
     for volume in &geometry.volumes().links {
         let link = &geometry.links[volume.link];
+        if geometry.volumes().unseen.contains(&volume.link) {
+            let _ = writeln!(
+                out,
+                "\n# {}: part of its geometry could not be read",
+                link.name
+            );
+            continue;
+        }
         let name = quoted(&link.name);
         for shape in &volume.shapes {
             let _ = writeln!(out, "\n[[volume]]\nlink = {name}");

@@ -176,6 +176,7 @@ fn known(source: Text, at: usize, what: &str, name: &str, geometry: &Geometry) -
 }
 
 fn plane(source: Text, what: &str, name: String, o: &ShapeEntry) -> Result<Obstacle> {
+    own_keys(source, what, o)?;
     let at = o.kind.span().start;
     let bad = || source.error(at, what, "a plane has normal = [x, y, z] and offset, in m");
     let normal = three(o.normal.as_deref()).ok_or_else(bad)?;
@@ -196,6 +197,32 @@ fn three(list: Option<&[f64]>) -> Option<Vector3<f64>> {
     match list? {
         [x, y, z] if [x, y, z].iter().all(|v| v.abs() <= LARGEST) => Some(Vector3::new(*x, *y, *z)),
         _ => None,
+    }
+}
+
+/// Refuses keys that belong to another kind.
+fn own_keys(source: Text, what: &str, e: &ShapeEntry) -> Result<()> {
+    let kind = e.kind.get_ref().as_str();
+    let keys = [
+        ("from", e.from.is_some(), "capsule"),
+        ("to", e.to.is_some(), "capsule"),
+        ("centre", e.centre.is_some(), "sphere"),
+        ("radius", e.radius.is_some(), "capsule sphere"),
+        ("size", e.size.is_some(), "box"),
+        ("pose", e.pose.is_some(), "box"),
+        ("normal", e.normal.is_some(), "plane"),
+        ("offset", e.offset.is_some(), "plane"),
+    ];
+    let other = keys
+        .iter()
+        .find(|(_, there, kinds)| *there && !kinds.split(' ').any(|k| k == kind));
+    match other {
+        Some((key, _, kinds)) => {
+            let kinds = kinds.replace(' ', " or a ");
+            let message = format!("`{key}` belongs to a {kinds}, not to a {kind}; remove it");
+            Err(source.error(e.kind.span().start, what, message))
+        }
+        None => Ok(()),
     }
 }
 
@@ -253,5 +280,6 @@ fn shape(source: Text, what: &str, e: &ShapeEntry) -> Result<Shape> {
             return Err(source.error(at, what, message));
         }
     };
+    own_keys(source, what, e)?;
     found.ok_or_else(|| source.error(at, what, needs))
 }

@@ -173,7 +173,7 @@ impl Geometry {
 
     /// Whether the files say anything about volumes or surroundings.
     pub fn is_empty(&self) -> bool {
-        self.parts.is_empty() && self.stated.is_empty()
+        self.parts.is_empty() && self.stated.is_empty() && self.keep_in.is_empty()
     }
 
     /// Looks for meshes in these folders first.

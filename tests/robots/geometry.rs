@@ -1,0 +1,682 @@
+//! Volumes of links, where they come from, and the pairs of them that are looked at.
+
+use excite::collision::scene::{Obstacle, Scene};
+use excite::robot::geometry::Origin;
+use excite::solid::Shape;
+use excite::{Error, Plant, Robot, Warning, WarningKind};
+use nalgebra::{Rotation3, Vector3};
+use std::path::Path;
+use std::sync::Arc;
+use tempfile::TempDir;
+
+type V = Vector3<f64>;
+
+const BASE: &str = r#"<collision><origin xyz="0 0 0.15"/><geometry><box size="0.2 0.2 0.3"/></geometry></collision>"#;
+const UPPER: &str = r#"<collision><origin xyz="0.2 0 0" rpy="0 1.5707963267948966 0"/><geometry><capsule radius="0.05" length="0.4"/></geometry></collision>"#;
+const LOWER: &str = UPPER;
+const INERTIA: &str = r#"<inertial><origin xyz="0.2 0 0"/><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial>"#;
+
+/// An arm in the vertical x-z plane, its shoulder 0.4 m above the ground; `more` goes before its end.
+fn arm(base: &str, upper: &str, lower: &str, more: &str) -> String {
+    format!(
+        r#"<robot name="arm">
+<link name="base">{base}</link>
+<link name="upper">{INERTIA}{upper}</link>
+<link name="lower">{INERTIA}{lower}</link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.4"/><axis xyz="0 -1 0"/><limit lower="-3" upper="3" velocity="3" effort="60"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 -1 0"/><limit lower="-2" upper="2" velocity="4" effort="30"/></joint>
+{more}</robot>
+"#
+    )
+}
+
+fn plain() -> String {
+    arm(BASE, UPPER, LOWER, "")
+}
+
+/// The robot file: two lines and more.
+fn toml(more: &str) -> String {
+    format!("name = \"arm\"\nurdf = \"arm.urdf\"\n{more}")
+}
+
+fn stated(urdf: &str, more: &str) -> Robot {
+    Robot::from_toml_str(&toml(more), urdf, "robot.toml").unwrap()
+}
+
+/// What a robot must not touch, and the warnings about it.
+fn scene_of(robot: &Robot) -> Arc<Scene> {
+    Plant::from(robot).scene().unwrap().expect("volumes")
+}
+
+/// Least signed distance of a point of a link's frame from the volumes of that link.
+fn inside(robot: &Robot, link: &str, point: &V) -> f64 {
+    let geometry = &robot.geometry;
+    let index = geometry.link(link).unwrap();
+    let at = geometry.links[index].pose.apply(point);
+    let all = geometry.volumes().links.iter().filter(|v| v.link == index);
+    all.flat_map(|v| &v.shapes)
+        .map(|s| s.signed_distance(&at))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Forms of 0.1 m radius and 0.3 m length, points of their surface, and how far a volume may lie outside.
+fn forms() -> Vec<(&'static str, Vec<V>, f64)> {
+    let rim = |z: f64| {
+        (0..24).map(move |k| {
+            let (s, c) = (f64::from(k) * 0.2618).sin_cos();
+            V::new(0.1 * c, 0.1 * s, z)
+        })
+    };
+    let signs = [-1.0, 1.0];
+    let corners = signs.into_iter().flat_map(|x| {
+        signs.into_iter().flat_map(move |y| {
+            let size = move |z: f64| V::new(0.05 * x, 0.1 * y, 0.15 * z);
+            signs.map(size)
+        })
+    });
+    let tips = [V::z() * 0.25, V::z() * -0.25];
+    vec![
+        (r#"<sphere radius="0.1"/>"#, rim(0.0).collect(), 1e-9),
+        (r#"<box size="0.1 0.2 0.3"/>"#, corners.collect(), 1e-9),
+        (
+            r#"<capsule radius="0.1" length="0.3"/>"#,
+            rim(-0.15).chain(rim(0.15)).chain(tips).collect(),
+            1e-9,
+        ),
+        (
+            r#"<cylinder radius="0.1" length="0.3"/>"#,
+            rim(-0.15).chain(rim(0.15)).collect(),
+            0.1,
+        ),
+    ]
+}
+
+#[test]
+fn forms_are_enclosed_where_their_origin_puts_them() {
+    let turn = Rotation3::from_euler_angles(0.4, -0.5, 0.6);
+    let shift = V::new(0.1, -0.2, 0.3);
+    for (form, surface, outside) in forms() {
+        let upper = format!(
+            r#"<collision><origin xyz="0.1 -0.2 0.3" rpy="0.4 -0.5 0.6"/><geometry>{form}</geometry></collision>"#
+        );
+        let robot = Robot::from_urdf_str(&arm(BASE, &upper, LOWER, ""), "arm.urdf").unwrap();
+        for p in surface {
+            let d = inside(&robot, "upper", &(turn * p + shift));
+            assert!(d <= 1e-9 && d >= -outside, "{form} {p}: {d}");
+        }
+        assert!(inside(&robot, "upper", &(turn * V::x() * 0.5 + shift)) > 0.2);
+    }
+}
+
+/// A link on the upper one, held by a joint of this type.
+fn covered(kind: &str, form: &str) -> String {
+    let more = format!(
+        r#"<link name="cover"><collision><origin xyz="0 0.05 0"/><geometry>{form}</geometry></collision></link>
+<joint name="hinge" type="{kind}"><parent link="upper"/><child link="cover"/><origin xyz="0.3 0.1 0" rpy="0 0.3 0"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+"#
+    );
+    arm(BASE, UPPER, LOWER, &more)
+}
+
+#[test]
+fn links_that_are_held_have_their_volumes_on_the_body_that_holds_them() {
+    for (form, surface, outside) in forms() {
+        let fixed = Robot::from_urdf_str(&covered("fixed", form), "arm.urdf").unwrap();
+        let locked = stated(&covered("revolute", form), "lock = { hinge = 0.7 }\n");
+        for (robot, angle) in [(fixed, 0.0), (locked, 0.7)] {
+            let geometry = &robot.geometry;
+            let cover = geometry.link("cover").unwrap();
+            assert_eq!(geometry.links[cover].body, Some(0));
+            let volumes = &geometry.volumes().links;
+            let own = volumes.iter().find(|v| v.link == cover).unwrap();
+            // from the form to the body, by hand
+            for p in &surface {
+                let in_link = p + V::new(0.0, 0.05, 0.0);
+                let turned = Rotation3::from_axis_angle(&V::z_axis(), angle) * in_link;
+                let at = Rotation3::from_axis_angle(&V::y_axis(), 0.3) * turned;
+                let at = at + V::new(0.3, 0.1, 0.0);
+                let each = own.shapes.iter().map(|s| s.signed_distance(&at));
+                let d = each.fold(f64::INFINITY, f64::min);
+                assert!(d <= 1e-9 && d >= -outside, "{form} at {angle}: {d}");
+            }
+        }
+    }
+}
+
+#[test]
+fn visual_geometry_counts_only_where_there_is_no_other() {
+    let visual = r#"<visual><geometry><sphere radius="0.3"/></geometry></visual>"#;
+    let alone = Robot::from_urdf_str(&arm(BASE, visual, LOWER, ""), "arm.urdf").unwrap();
+    assert!((inside(&alone, "upper", &V::zeros()) + 0.3).abs() < 1e-12);
+    let both = format!("{visual}{UPPER}");
+    let both = Robot::from_urdf_str(&arm(BASE, &both, LOWER, ""), "arm.urdf").unwrap();
+    assert!((inside(&both, "upper", &V::zeros()) + 0.05).abs() < 1e-9);
+}
+
+#[test]
+fn stated_volumes_stand_instead_of_the_geometry_of_their_link() {
+    let more =
+        "[[volume]]\nlink = \"upper\"\nkind = \"sphere\"\ncentre = [0.1, 0.0, 0.0]\nradius = 0.2\n";
+    let robot = stated(&plain(), more);
+    assert!((inside(&robot, "upper", &V::new(0.1, 0.0, 0.0)) + 0.2).abs() < 1e-12);
+    assert!(inside(&robot, "upper", &V::new(0.4, 0.0, 0.0)) > 0.09);
+    let origins = robot.geometry.volumes().links.iter().map(|v| v.origin);
+    assert_eq!(
+        origins.collect::<Vec<_>>(),
+        [Origin::Urdf, Origin::Stated, Origin::Urdf]
+    );
+}
+
+/// A wedge of unequal sides as an OBJ, and its corners.
+fn wedge(size: f64) -> (String, Vec<V>) {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.5],
+        [0.0, 1.0, 0.5],
+    ]
+    .map(|[x, y, z]| V::new(x, y, z) * size);
+    let mut text = String::new();
+    for c in &corners {
+        text += &format!("v {} {} {}\n", c.x, c.y, c.z);
+    }
+    text += "f 1 4 3 2\nf 1 2 5\nf 3 4 6\nf 2 3 6 5\nf 1 5 6 4\n";
+    (text, corners.to_vec())
+}
+
+fn mesh(file: &str, scale: &str) -> String {
+    format!(
+        r#"<collision><origin xyz="0 0.02 0"/><geometry><mesh filename="{file}"{scale}/></geometry></collision>"#
+    )
+}
+
+/// A folder with these files.
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, content) in files {
+        put(dir.path(), name, content);
+    }
+    dir
+}
+
+fn put(dir: &Path, name: &str, content: &str) {
+    let path = dir.join(name);
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(path, content).unwrap();
+}
+
+fn load(dir: &TempDir, name: &str) -> Plant {
+    Plant::load(dir.path().join(name).to_str().unwrap()).unwrap()
+}
+
+#[track_caller]
+fn holds_wedge(robot: &Robot, corners: &[V], scale: V) {
+    assert!(
+        robot.geometry.volumes().warnings.is_empty(),
+        "{:?}",
+        robot.geometry.volumes().warnings
+    );
+    holds(robot, corners, scale);
+}
+
+#[track_caller]
+fn holds(robot: &Robot, corners: &[V], scale: V) {
+    for c in corners {
+        let p = c.component_mul(&scale) + V::new(0.0, 0.02, 0.0);
+        let d = inside(robot, "upper", &p);
+        assert!((-0.2..=1e-9).contains(&d), "{c}: {d}");
+    }
+}
+
+#[test]
+fn meshes_are_found_and_enclosed() {
+    let (text, corners) = wedge(0.1);
+    let one = V::repeat(1.0);
+    let package = "package://arm_description/meshes/part.obj";
+    for (named, lies) in [
+        ("part.obj", "part.obj"),
+        ("meshes/part.obj", "meshes/part.obj"),
+        (package, "arm_description/meshes/part.obj"),
+        (package, "meshes/part.obj"),
+    ] {
+        let urdf = arm(BASE, &mesh(named, ""), LOWER, "");
+        let dir = folder(&[("arm.urdf", &urdf), (lies, &text)]);
+        holds_wedge(load(&dir, "arm.urdf").robot(), &corners, one);
+    }
+    let urdf = arm(BASE, &mesh(package, ""), LOWER, "");
+    let lies = "elsewhere/arm_description/meshes/part.obj";
+    let file = toml("[collision]\nmeshes = [\"elsewhere\"]\n");
+    let dir = folder(&[
+        ("arm.urdf", &urdf),
+        ("robot.toml", &file),
+        (lies, text.as_str()),
+    ]);
+    holds_wedge(load(&dir, "robot.toml").robot(), &corners, one);
+    // the same file without the statement, and with the folder given to the plant
+    let plant = load(&dir, "arm.urdf");
+    assert_eq!(plant.scene().unwrap().unwrap().unseen, ["upper"]);
+    let plant = plant.with_meshes(&[dir.path().join("elsewhere")]);
+    holds_wedge(plant.robot(), &corners, one);
+    assert!(plant.scene().unwrap().unwrap().unseen.is_empty());
+}
+
+#[test]
+fn meshes_are_scaled_as_the_urdf_says() {
+    let (text, corners) = wedge(100.0);
+    let urdf = arm(
+        BASE,
+        &mesh("part.obj", " scale=\"0.001 0.002 -0.001\""),
+        LOWER,
+        "",
+    );
+    let dir = folder(&[("arm.urdf", &urdf), ("part.obj", &text)]);
+    holds_wedge(
+        load(&dir, "arm.urdf").robot(),
+        &corners,
+        V::new(0.001, 0.002, -0.001),
+    );
+}
+
+#[track_caller]
+fn warned<'a>(all: &'a [Warning], kind: WarningKind, words: &[&str]) -> &'a Warning {
+    let fits = |w: &&Warning| {
+        let text = w.to_string();
+        w.kind == kind && words.iter().all(|word| text.contains(word))
+    };
+    let found = all.iter().find(fits);
+    found.unwrap_or_else(|| panic!("no {kind:?} with {words:?} in {all:?}"))
+}
+
+#[test]
+fn meshes_that_cannot_be_read_are_told_and_the_robot_is_used_all_the_same() {
+    for (name, content, word) in [
+        ("part.stl", None, "not found"),
+        ("part.stl", Some(""), "no triangle"),
+        ("part.obj", Some(""), "no triangle"),
+        ("part.stl", Some("this is no mesh\nat all"), "no triangle"),
+        ("part.obj", Some("f a b c\n"), "line 1"),
+        ("part.obj", Some("v 0 zero 0\n"), "line 1"),
+        (
+            "part.obj",
+            Some("v 0 0 NaN\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+            "not finite",
+        ),
+        ("part.dae", Some("<COLLADA/>"), ".dae"),
+    ] {
+        let urdf = arm(BASE, &mesh(name, ""), LOWER, "");
+        let dir = folder(&[("arm.urdf", &urdf)]);
+        if let Some(content) = content {
+            put(dir.path(), name, content);
+        }
+        let plant = load(&dir, "arm.urdf");
+        let scene = plant.scene().unwrap().expect("the other links");
+        warned(
+            &scene.warnings,
+            WarningKind::GeometryUnread,
+            &["link `upper`", word],
+        );
+        warned(
+            &scene.warnings,
+            WarningKind::CollisionNotChecked,
+            &["upper"],
+        );
+        assert_eq!(scene.unseen, ["upper"], "{name} {content:?}");
+        assert!(plant.base().unwrap().count() > 0);
+    }
+}
+
+#[test]
+fn a_mesh_in_millimetres_is_told_and_scaled() {
+    let (text, corners) = wedge(100.0);
+    let urdf = arm(BASE, &mesh("part.obj", ""), LOWER, "");
+    let dir = folder(&[("arm.urdf", &urdf), ("part.obj", &text)]);
+    let plant = load(&dir, "arm.urdf");
+    let scene = plant.scene().unwrap().unwrap();
+    let words = ["link `upper`", "millimetres", "0.001 0.001 0.001"];
+    warned(&scene.warnings, WarningKind::GeometryUnread, &words);
+    assert!(scene.unseen.is_empty(), "{:?}", scene.unseen);
+    holds(plant.robot(), &corners, V::repeat(0.001));
+}
+
+#[test]
+fn statements_that_make_no_sense_are_refused_with_their_line() {
+    let sphere = "[[volume]]\nlink = \"upper\"\nkind = \"sphere\"\n";
+    let cases: Vec<(String, &[&str])> = vec![
+        (
+            sphere.replace("upper", "uper"),
+            &["line 4", "`uper`", "`upper`"],
+        ),
+        (
+            sphere.replace("sphere", "spere"),
+            &["line 5", "`spere`", "sphere"],
+        ),
+        (
+            format!("{sphere}centre = [0, 0, 0]\nradius = -0.1\n"),
+            &["line 5", "radius", "upper"],
+        ),
+        (
+            format!("{sphere}centre = [0, 0]\nradius = 0.1\n"),
+            &["line 5", "centre"],
+        ),
+        (
+            "[[volume]]\nkind = \"sphere\"\n".into(),
+            &["line 4", "link"],
+        ),
+        (
+            "[[volume]]\nlink = \"upper\"\nkind = \"box\"\nsize = [1, 0, 1]\n".into(),
+            &["line 5", "size"],
+        ),
+        (
+            "[collision]\nmargin = 5\n".into(),
+            &["line 4", "margin", "5"],
+        ),
+        (
+            "[collision]\nmargin = nan\n".into(),
+            &["line 4", "margin", "NaN"],
+        ),
+        (
+            "[collision]\nignore = [[\"upper\"]]\n".into(),
+            &["line 4", "pairs"],
+        ),
+        (
+            "[collision]\nignore = [[\"base\", \"lowr\"]]\n".into(),
+            &["line 4", "`lowr`", "`lower`"],
+        ),
+        (
+            "[collision]\nflor = true\n".into(),
+            &["line 4", "`flor`", "floor"],
+        ),
+        (
+            "[[keep_in]]\nframe = \"lower\"\nlow = [0, 0, 1]\nhigh = [1, 1, 0]\n".into(),
+            &["line 4", "low", "high"],
+        ),
+        (
+            "[[keep_in]]\nframe = \"lower\"\nlow = [0, 0]\n".into(),
+            &["line 4", "three numbers"],
+        ),
+        (
+            "[[keep_in]]\nframe = \"wrist\"\n".into(),
+            &["line 4", "`wrist`"],
+        ),
+        (
+            "[[obstacle]]\nname = \"wall\"\nkind = \"plane\"\noffset = 1.0\n".into(),
+            &["line 5", "`wall`", "normal"],
+        ),
+        (
+            "[[obstacle]]\nkind = \"plane\"\nnormal = [0, 0, 0]\n".into(),
+            &["line 4", "normal"],
+        ),
+        (
+            "[[obstacle]]\nlink = \"upper\"\nkind = \"plane\"\nnormal = [0, 0, 1]\n".into(),
+            &["line 4", "base frame"],
+        ),
+    ];
+    for (more, words) in cases {
+        let found = Robot::from_toml_str(&toml(&more), &plain(), "robot.toml");
+        let message = found.err().unwrap_or_else(|| panic!("accepted: {more}"));
+        let message = message.to_string();
+        for word in words {
+            assert!(message.contains(word), "no `{word}` in: {message}\n{more}");
+        }
+        assert!(
+            !message.contains('\n') && message.contains("robot.toml"),
+            "{message}"
+        );
+    }
+}
+
+/// Why a pair is left out, in either order.
+fn left_out<'a>(scene: &'a Scene, a: &str, b: &str) -> Option<&'a str> {
+    let found = (scene.left_out.iter()).find(|l| {
+        let [x, y] = &l.between;
+        (x == a && y == b) || (x == b && y == a)
+    });
+    found.map(|l| l.why.as_str())
+}
+
+fn looked_at(scene: &Scene, a: &str, b: &str) -> bool {
+    let mut names = scene.pairs.iter().map(|p| scene.names(p));
+    names.any(|n| n == [a, b] || n == [b, a])
+}
+
+#[test]
+fn an_srdf_leaves_pairs_out() {
+    let file = toml("[collision]\nsrdf = \"arm.srdf\"\n");
+    let with = |pairs: &[[&str; 2]]| {
+        let mut text = String::from("<robot name=\"arm\">");
+        for [a, b] in pairs {
+            text += &format!(r#"<disable_collisions link1="{a}" link2="{b}" reason="Never"/>"#);
+        }
+        let urdf = plain();
+        let dir = folder(&[("arm.urdf", &urdf), ("robot.toml", &file)]);
+        put(dir.path(), "arm.srdf", &(text + "</robot>"));
+        load(&dir, "robot.toml").scene()
+    };
+    let scene = with(&[]).unwrap().unwrap();
+    assert!(looked_at(&scene, "base", "lower"));
+    let scene = with(&[["lower", "base"]]).unwrap().unwrap();
+    assert!(!looked_at(&scene, "base", "lower"));
+    assert_eq!(
+        left_out(&scene, "base", "lower"),
+        Some("named by the robot file")
+    );
+
+    let scene = with(&[["lower", "base"], ["lower", "gripper"]]).unwrap();
+    let scene = scene.unwrap();
+    assert!(!looked_at(&scene, "base", "lower"));
+    let words = ["`gripper`", "1 of its 2 pairs", "arm.srdf"];
+    warned(&scene.warnings, WarningKind::EntryIgnored, &words);
+
+    let message = with(&[["link1", "link2"]]).unwrap_err().to_string();
+    assert!(
+        message.contains("another robot") && message.contains("`link1`"),
+        "{message}"
+    );
+    let urdf = plain();
+    let dir = folder(&[("arm.urdf", &urdf), ("robot.toml", &file)]);
+    let message = load(&dir, "robot.toml").scene().unwrap_err().to_string();
+    assert!(message.contains("arm.srdf"), "{message}");
+    for text in ["<robot", "<sdf/>"] {
+        put(dir.path(), "arm.srdf", text);
+        let message = load(&dir, "robot.toml").scene().unwrap_err().to_string();
+        assert!(message.contains("arm.srdf"), "{message}");
+    }
+}
+
+#[test]
+fn links_that_a_joint_joins_are_left_out() {
+    let robot = Robot::from_urdf_str(&plain(), "arm.urdf").unwrap();
+    let scene = scene_of(&robot);
+    for (a, b) in [("base", "upper"), ("upper", "lower")] {
+        assert_eq!(left_out(&scene, a, b), Some("joined by a joint"));
+        assert!(!looked_at(&scene, a, b));
+    }
+    assert!(looked_at(&scene, "base", "lower"));
+    assert!(looked_at(&scene, "upper", "floor") && looked_at(&scene, "lower", "floor"));
+    assert!(!looked_at(&scene, "base", "floor"));
+    // what carries a link without volume stands for it
+    let scene = scene_of(&stated(&arm(BASE, "", LOWER, ""), ""));
+    assert_eq!(left_out(&scene, "base", "lower"), Some("joined by a joint"));
+    assert_eq!(scene.unseen, ["upper"]);
+}
+
+#[test]
+fn pairs_that_no_posture_keeps_apart_are_left_out() {
+    let large = r#"<collision><geometry><sphere radius="0.6"/></geometry></collision>"#;
+    let robot = stated(&arm(BASE, UPPER, large, ""), "[collision]\nfloor = false\n");
+    let scene = scene_of(&robot);
+    assert_eq!(
+        left_out(&scene, "base", "lower"),
+        Some("nearer than the margin in every posture")
+    );
+    assert!(!looked_at(&scene, "base", "lower"));
+}
+
+#[test]
+fn fingers_that_follow_one_joint_are_left_out() {
+    let finger = |name: &str, y: &str, mimic: &str| {
+        format!(
+            r#"<link name="{name}"><collision><geometry><box size="0.1 0.02 0.02"/></geometry></collision></link>
+<joint name="{name}_joint" type="prismatic"><parent link="lower"/><child link="{name}"/><origin xyz="0.5 0 0"/><axis xyz="0 {y} 0"/><limit lower="0" upper="0.04" velocity="0.1" effort="10"/>{mimic}</joint>
+"#
+        )
+    };
+    let more = finger("left", "1", "") + &finger("right", "-1", r#"<mimic joint="left_joint"/>"#);
+    let robot = Robot::from_urdf_str(&arm(BASE, UPPER, LOWER, &more), "arm.urdf").unwrap();
+    let scene = scene_of(&robot);
+    assert_eq!(
+        left_out(&scene, "left", "right"),
+        Some("both follow one joint")
+    );
+    assert!(looked_at(&scene, "left", "upper") && looked_at(&scene, "right", "floor"));
+}
+
+fn floors(scene: &Scene) -> usize {
+    let plane = |o: &&Obstacle| matches!(o, Obstacle::Plane { name, .. } if name == "floor");
+    scene.obstacles.iter().filter(plane).count()
+}
+
+#[test]
+fn a_base_that_stands_on_its_own_frame_has_a_floor() {
+    let stands = scene_of(&stated(&plain(), ""));
+    assert_eq!(floors(&stands), 1);
+    assert!(stands.warnings.is_empty(), "{:?}", stands.warnings);
+    let without = scene_of(&stated(&plain(), "[collision]\nfloor = false\n"));
+    assert_eq!(floors(&without), 0);
+    assert!(without.warnings.is_empty(), "{:?}", without.warnings);
+
+    let deep = arm(&BASE.replace("0 0 0.15", "0 0 0.05"), UPPER, LOWER, "");
+    let scene = scene_of(&stated(&deep, ""));
+    assert_eq!(floors(&scene), 0);
+    warned(
+        &scene.warnings,
+        WarningKind::CollisionNotChecked,
+        &["floor", "0.10 m below"],
+    );
+    let scene = scene_of(&stated(&deep, "[collision]\nfloor = true\n"));
+    assert_eq!(floors(&scene), 1);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn a_frame_is_kept_in_a_box_without_margin() {
+    let more = "[[keep_in]]\nframe = \"lower\"\nlow = [-1.0, -inf, 0.1]\nhigh = [0.3, inf, inf]\n";
+    let scene = scene_of(&stated(&plain(), more));
+    let kept = scene.pairs.iter().filter(|p| p.margin == 0.0);
+    let mut names: Vec<_> = kept.map(|p| scene.names(p).join(", ")).collect();
+    names.sort();
+    assert_eq!(
+        names,
+        [
+            // x never leaves its low side, and is looked at all the same
+            "origin of lower, keep_in high x",
+            "origin of lower, keep_in low x",
+            "origin of lower, keep_in low z",
+        ]
+    );
+    for q in &scene.free {
+        // the elbow from the shoulder
+        assert!(0.4 * q[0].cos() <= 0.3 && 0.4 + 0.4 * q[0].sin() >= 0.1);
+    }
+    assert!(!scene.free.is_empty());
+}
+
+#[track_caller]
+fn no_room(more: &str, names: &[&str]) {
+    let robot = stated(&plain(), more);
+    let found = Plant::from(robot).scene().map(|s| s.map(|s| s.free.len()));
+    match found {
+        Err(Error::Infeasible(message)) => {
+            for name in names {
+                assert!(message.contains(name), "no {name} in: {message}");
+            }
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn two_walls_without_room_between_them_are_an_error() {
+    let wall = |name: &str, x: f64| {
+        format!(
+            "[[obstacle]]\nname = \"{name}\"\nkind = \"plane\"\nnormal = [{x:?}, 0, 0]\noffset = 0.1\n"
+        )
+    };
+    let more = wall("behind", 1.0) + &wall("ahead", -1.0);
+    no_room(&more, &["lower", "behind", "ahead"]);
+}
+
+#[test]
+fn an_obstacle_around_everything_is_an_error() {
+    let more = "[[obstacle]]\nname = \"crate\"\nkind = \"box\"\nsize = [10, 10, 10]\n";
+    no_room(more, &["upper", "lower", "crate"]);
+}
+
+#[test]
+fn a_plant_without_collisions_has_no_scene() {
+    let plant = Plant::from(Robot::from_urdf_str(&plain(), "arm.urdf").unwrap());
+    assert!(plant.scene().unwrap().is_some());
+    assert!(plant.without_collisions().scene().unwrap().is_none());
+    let unchecked = stated(&plain(), "[collision]\ncheck = false\n");
+    assert!(Plant::from(unchecked).scene().unwrap().is_none());
+    let bare = Robot::from_urdf_str(&arm("", "", "", ""), "arm.urdf").unwrap();
+    assert!(Plant::from(bare).scene().unwrap().is_none());
+}
+
+#[test]
+fn the_template_states_volumes_that_enclose_the_same() {
+    let (text, _) = wedge(0.1);
+    let lower = format!(
+        r#"<collision><origin xyz="0.1 0 0" rpy="0.3 0.2 0.1"/><geometry><cylinder radius="0.05" length="0.3"/></geometry></collision>
+<collision><origin rpy="1.5707963267948966 1.5707963267948966 0.3"/><geometry><box size="0.1 0.123456 0.3"/></geometry></collision>"#
+    );
+    let cover = r#"<link name="cover"><collision><origin xyz="0.0123456 0 0"/><geometry><sphere radius="0.0654321"/></geometry></collision></link>
+<joint name="bolt" type="fixed"><parent link="upper"/><child link="cover"/><origin xyz="0.3 0.1 0" rpy="0.7 0.3 0.2"/></joint>
+"#;
+    let urdf = arm(BASE, &mesh("part.obj", ""), &lower, cover);
+    let dir = folder(&[("arm.urdf", &urdf), ("part.obj", &text)]);
+    let plant = load(&dir, "arm.urdf");
+    let before = plant.robot();
+    let again = before.to_toml_template("arm.urdf");
+    let after = Robot::from_toml_str(&again, &urdf, "robot.toml").unwrap();
+    for link in ["base", "upper", "lower", "cover"] {
+        for i in 0..1000 {
+            let [x, y, z] = [1, 10, 100].map(|k| 0.1 * f64::from(i / k % 10) - 0.45);
+            let p = V::new(x, y, z);
+            let (old, new) = (inside(before, link, &p), inside(&after, link, &p));
+            assert!(
+                new <= old + 1e-9 && new >= old - 1e-3,
+                "{link} {p}: {old} then {new}"
+            );
+        }
+    }
+    let stated = after.geometry.volumes().links.iter().map(|v| v.origin);
+    assert!(stated.into_iter().all(|o| o == Origin::Stated));
+    let count = |r: &Robot| -> usize {
+        let links = r.geometry.volumes().links.iter();
+        links.map(|v| v.shapes.len()).sum()
+    };
+    assert_eq!(count(before), count(&after));
+    // a sphere stays one
+    let cover = after.geometry.link("cover").unwrap();
+    let links = &after.geometry.volumes().links;
+    let cover = links.iter().find(|v| v.link == cover).unwrap();
+    assert!(matches!(cover.shapes[..], [Shape::Sphere { .. }]));
+}
+
+/// A slider of 4 m with a post in the middle: it passes on neither side, but stands free on both.
+#[test]
+fn long_slides_are_looked_at_over_their_whole_range() {
+    let urdf = format!(
+        r#"<robot name="gantry"><link name="rail"/>
+<link name="carriage">{INERTIA}<collision><origin xyz="0 0 1"/><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+<joint name="slide" type="prismatic"><parent link="rail"/><child link="carriage"/><axis xyz="1 0 0"/><limit lower="0" upper="4" velocity="1" effort="100"/></joint>
+</robot>"#
+    );
+    let post = "[[obstacle]]\nname = \"post\"\nkind = \"box\"\nsize = [1.2, 0.5, 0.5]\npose = [2, 0, 1, 0, 0, 0]\n";
+    let scene = scene_of(&stated(&urdf, post));
+    assert_eq!(left_out(&scene, "carriage", "post"), None);
+    assert!(looked_at(&scene, "carriage", "post"));
+}
