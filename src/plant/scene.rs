@@ -2,7 +2,6 @@
 
 use super::Plant;
 use crate::collision::clearance::{Fineness, Path, clearances};
-use crate::collision::scene::poses;
 use crate::collision::{Scene, build};
 use crate::error::{Result, Warning, WarningKind};
 use crate::robot::{Motion, Robot};
@@ -116,24 +115,20 @@ impl Plant {
         }
     }
 
-    /// Least clearances of a motion: for all time of a tree, with the bound stated of a closed chain. `None`
-    /// where there is no [`Plant::scene`].
+    /// Least clearances of a motion over all time. `None` where there is no [`Plant::scene`].
     ///
     /// # Errors
-    /// As [`Plant::scene`]; a pose that cannot be reached.
+    /// As [`Plant::scene`].
     pub fn clearance(&self, fourier: &Fourier) -> Result<Option<ClearanceCertificate>> {
         let Some(scene) = self.scene()? else {
             return Ok(None);
         };
-        let (pairs, proof) = match self.mechanism() {
-            None => (self.proven(&scene, fourier), Proof::Enclosed),
-            Some(_) => (self.stated(&scene, fourier)?, Proof::Stated),
-        };
+        let pairs = self.proven(&scene, fourier);
         let kept = |p: &PairClearance| p.bound >= p.margin - TOLERANCE;
         Ok(Some(ClearanceCertificate {
             satisfied: pairs.iter().all(kept),
             pairs,
-            proof,
+            proof: Proof::Enclosed,
             unseen: scene.unseen.clone(),
         }))
     }
@@ -146,35 +141,6 @@ impl Plant {
             (named(scene, c.pair, [c.met, c.time, c.bound]), pair.margin)
         });
         by_names(all.map(|(p, _)| p))
-    }
-
-    /// Samples, and twice the largest second difference between them.
-    fn stated(&self, scene: &Scene, fourier: &Fourier) -> Result<Vec<PairClearance>> {
-        const SAMPLES: usize = 2000;
-        let motion = fourier.motion(SAMPLES);
-        let mut along = vec![Vec::with_capacity(SAMPLES); scene.pairs.len()];
-        let mut at = Vec::new();
-        for i in 0..SAMPLES {
-            let x: Vec<f64> = (0..motion.dof).map(|k| motion.q[k * SAMPLES + i]).collect();
-            poses(self.robot(), &self.posture(&x)?, &mut at);
-            for (pair, list) in scene.pairs.iter().zip(&mut along) {
-                list.push(scene.separation(pair, &at).distance);
-            }
-        }
-        let step = fourier.period / SAMPLES as f64;
-        Ok(by_names(along.iter().enumerate().map(|(p, d)| {
-            let least = (0..SAMPLES)
-                .min_by(|a, b| d[*a].total_cmp(&d[*b]))
-                .unwrap_or(0);
-            let second =
-                |i: usize| d[(i + 1) % SAMPLES] - 2.0 * d[i] + d[(i + SAMPLES - 1) % SAMPLES];
-            let bend = (0..SAMPLES).map(|i| second(i).abs()).fold(0.0, f64::max);
-            named(
-                scene,
-                p,
-                [d[least], least as f64 * step, d[least] - 0.25 * bend],
-            )
-        })))
     }
 }
 
