@@ -57,6 +57,8 @@
 //! SI units everywhere. All conventions are in [`documentation::notation`], the method with its
 //! equations in [`documentation::method`].
 #![warn(missing_docs)]
+// `!(x <= limit)` is meant: it holds for what is no number, too
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 // Modules and names under `#[doc(hidden)]` are internals that the program, the tests and the benchmarks use. They may
 // change at any time.

@@ -628,10 +628,8 @@ fn a_plant_without_collisions_has_no_scene() {
 #[test]
 fn the_template_states_volumes_that_enclose_the_same() {
     let (text, _) = wedge(0.1);
-    let lower = format!(
-        r#"<collision><origin xyz="0.1 0 0" rpy="0.3 0.2 0.1"/><geometry><cylinder radius="0.05" length="0.3"/></geometry></collision>
-<collision><origin rpy="1.5707963267948966 1.5707963267948966 0.3"/><geometry><box size="0.1 0.123456 0.3"/></geometry></collision>"#
-    );
+    let lower = r#"<collision><origin xyz="0.1 0 0" rpy="0.3 0.2 0.1"/><geometry><cylinder radius="0.05" length="0.3"/></geometry></collision>
+<collision><origin rpy="1.5707963267948966 1.5707963267948966 0.3"/><geometry><box size="0.1 0.123456 0.3"/></geometry></collision>"#.to_string();
     let cover = r#"<link name="cover"><collision><origin xyz="0.0123456 0 0"/><geometry><sphere radius="0.0654321"/></geometry></collision></link>
 <joint name="bolt" type="fixed"><parent link="upper"/><child link="cover"/><origin xyz="0.3 0.1 0" rpy="0.7 0.3 0.2"/></joint>
 "#;

@@ -275,7 +275,7 @@ fn shape(source: Text, what: &str, e: &ShapeEntry) -> Result<Shape> {
         }
         other => {
             let kinds = ["capsule", "sphere", "box"];
-            let hint = did_you_mean(other, kinds.into_iter());
+            let hint = did_you_mean(other, kinds);
             let message = format!("kind `{other}` is not known{hint}; use capsule, sphere or box");
             return Err(source.error(at, what, message));
         }

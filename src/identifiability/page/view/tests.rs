@@ -22,12 +22,11 @@ fn scene(plant: &Plant) -> Scene {
         body,
         shape,
     };
-    let mut s = Scene::default();
-    s.volumes = vec![
+    let volumes = vec![
         volume("base", None, ball(0.0)),
         volume("hand", Some(last), ball(0.1)),
     ];
-    s.obstacles = vec![
+    let obstacles = vec![
         scene::Obstacle::Plane {
             name: "floor".into(),
             normal: Vector3::z(),
@@ -43,14 +42,17 @@ fn scene(plant: &Plant) -> Scene {
         Partner::Obstacle(0),
         Partner::Obstacle(1),
     ];
-    s.pairs = (partners.into_iter())
-        .map(|partner| Pair {
-            volume: 1,
-            partner,
-            margin: 0.0,
-        })
-        .collect();
-    s
+    let pairs = partners.map(|partner| Pair {
+        volume: 1,
+        partner,
+        margin: 0.0,
+    });
+    Scene {
+        volumes,
+        obstacles,
+        pairs: pairs.to_vec(),
+        ..Scene::default()
+    }
 }
 
 fn swing(n: usize) -> Fourier {
