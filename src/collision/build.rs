@@ -15,6 +15,8 @@ use rayon::prelude::*;
 
 /// The base may reach this far below the plane `z = 0` and the plane be a floor all the same, m.
 const SUNK: f64 = 0.03;
+/// A pair that never has more room than this is left out: nothing can move it, m.
+const HARDLY: f64 = 1e-3;
 /// Room beyond which a posture is spacious, however much more there is, m.
 const FAR: f64 = 0.05;
 /// Free postures that are kept.
@@ -305,7 +307,7 @@ impl Scene {
             }
         };
         let never: Vec<bool> = (self.pairs.iter().enumerate())
-            .map(|(p, pair)| may_stay(pair) && rooms.iter().all(|r| r[p] < 0.0))
+            .map(|(p, pair)| may_stay(pair) && rooms.iter().all(|r| r[p] < HARDLY))
             .collect();
         let mut out = LeftOuts(std::mem::take(&mut self.left_out));
         for (pair, _) in self.pairs.iter().zip(&never).filter(|(_, n)| **n) {
@@ -330,6 +332,11 @@ impl Scene {
             .iter()
             .take(KEPT)
             .map(|(_, i)| postures[*i].clone())
+            .collect();
+        let most = |p: usize| rooms.iter().map(|r| r[p]).fold(0.0, f64::max);
+        self.most = (0..self.pairs.len())
+            .filter(|p| !never[*p])
+            .map(most)
             .collect();
         let mut never = never.into_iter();
         self.pairs.retain(|_| !never.next().unwrap_or(false));

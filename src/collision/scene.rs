@@ -59,6 +59,8 @@ pub struct Scene {
     pub obstacles: Vec<Obstacle>,
     /// what must stay apart
     pub pairs: Vec<Pair>,
+    /// the most room beyond its margin that each pair was seen with, m; empty where no posture was looked at
+    pub most: Vec<f64>,
     /// what is not looked at
     pub left_out: Vec<LeftOut>,
     /// links whose volume is not known

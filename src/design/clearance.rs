@@ -103,7 +103,10 @@ impl<'a> ClearanceLimits<'a> {
         });
         let change = change.collect();
         let extra = BETWEEN + 0.05 * (1.0 - tighter);
-        let need = scene.pairs.iter().map(|p| p.margin + extra).collect();
+        // no more than half of what a pair can have: one that turns about a vertical axis keeps its height
+        let more = |p: usize| scene.most.get(p).map_or(extra, |m| extra.min(0.5 * m));
+        let need = scene.pairs.iter().enumerate();
+        let need = need.map(|(p, pair)| pair.margin + more(p)).collect();
         ClearanceLimits {
             robot,
             rows,
