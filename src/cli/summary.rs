@@ -71,7 +71,9 @@ fn excitation(e: &Excitation) -> String {
         None => out.push_str("collisions: not looked at\n"),
         Some(c) => {
             let verdict = match c.certificate.satisfied {
-                true if c.certificate.unseen.is_empty() => "none",
+                true if c.certificate.unseen.is_empty() && c.certificate.always_near.is_empty() => {
+                    "none"
+                }
                 true => "none of what was looked at",
                 false => "TOO NEAR, do not run this",
             };

@@ -309,12 +309,29 @@ impl Scene {
         let never: Vec<bool> = (self.pairs.iter().enumerate())
             .map(|(p, pair)| may_stay(pair) && rooms.iter().all(|r| r[p] < HARDLY))
             .collect();
+        let mut always: Vec<[String; 2]> = Vec::new();
         let mut out = LeftOuts(std::mem::take(&mut self.left_out));
         for (pair, _) in self.pairs.iter().zip(&never).filter(|(_, n)| **n) {
             let [a, b] = self.names(pair);
             out.add(a, b, "nearer than the margin in every posture");
+            let names = [a.to_string(), b.to_string()];
+            if matches!(pair.partner, Partner::Volume(_)) && !always.contains(&names) {
+                always.push(names);
+            }
         }
         self.left_out = out.0;
+        if !always.is_empty() {
+            self.warnings.push(Warning::new(
+                WarningKind::CollisionNotChecked,
+                "collisions",
+                format!(
+                    "volumes of {} are near in every posture, so that nothing is known of these: look at the \
+                     meshes, state tighter [[volume]]s, or name the pair in `ignore`",
+                    in_words(&always)
+                ),
+            ));
+        }
+        self.always_near = always;
         let mut free: Vec<(f64, usize)> = rooms
             .iter()
             .enumerate()
@@ -373,6 +390,12 @@ impl Scene {
             named.join(", ")
         ))
     }
+}
+
+/// `a and b; c and d`.
+pub fn in_words(pairs: &[[String; 2]]) -> String {
+    let each: Vec<String> = pairs.iter().map(|[a, b]| format!("{a} and {b}")).collect();
+    each.join("; ")
 }
 
 /// Pairs of names that are left out, each once.

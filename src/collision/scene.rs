@@ -63,6 +63,8 @@ pub struct Scene {
     pub most: Vec<f64>,
     /// what is not looked at
     pub left_out: Vec<LeftOut>,
+    /// links whose volumes are so near in every posture that nothing can be said of them
+    pub always_near: Vec<[String; 2]>,
     /// links whose volume is not known
     pub unseen: Vec<String>,
     /// least distance of two things where nothing else is stated, m

@@ -159,6 +159,7 @@ fn clearance(e: &Excitation) -> Value {
         },
         "satisfied": c.certificate.satisfied,
         "unseen": c.certificate.unseen,
+        "always_near": c.certificate.always_near,
         "pairs": c.certificate.pairs,
         "left_out": c.left_out,
         "volumes": c.volumes,

@@ -45,7 +45,9 @@ pub struct ClearanceCertificate {
     pub proof: Proof,
     /// links whose volume is not known: what touches there is not seen
     pub unseen: Vec<String>,
-    /// whether every pair keeps its margin at all times
+    /// pairs of links whose volumes are so near in every posture that they are not looked at
+    pub always_near: Vec<[String; 2]>,
+    /// whether every pair that is looked at keeps its margin at all times
     pub satisfied: bool,
 }
 
@@ -130,6 +132,7 @@ impl Plant {
             pairs,
             proof: Proof::Enclosed,
             unseen: scene.unseen.clone(),
+            always_near: scene.always_near.clone(),
         }))
     }
 

@@ -1,6 +1,7 @@
 //! The verdict in a sentence, built from the facts.
 
 use super::{KNOWN, clearance, parameters};
+use crate::collision::build::in_words;
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::mechanism::PoseKind;
 use crate::plant::PairClearance;
@@ -24,7 +25,14 @@ fn collisions(e: &Excitation) -> String {
             all.join(", ")
         ),
     };
-    format!("Collisions: {}.{unseen}", clearance::sentence(c))
+    let near = match c.certificate.always_near.as_slice() {
+        [] => String::new(),
+        all => format!(
+            " Not looked at, because they are near in every posture: {}.",
+            in_words(all)
+        ),
+    };
+    format!("Collisions: {}.{unseen}{near}", clearance::sentence(c))
 }
 
 /// The pair that comes too near, in words.

@@ -420,6 +420,9 @@ fn bodies(
 
 /// Where every link sits, and its geometry.
 fn geometry(urdf: &Urdf, poses: &HashMap<&str, Pose>) -> Geometry {
+    let parents: HashMap<&str, &str> = (urdf.joints.iter())
+        .map(|j| (j.child.as_str(), j.parent.as_str()))
+        .collect();
     let links = urdf.links.iter().map(|link| {
         let at = poses.get(link.name.as_str()).copied().unwrap_or_default();
         Link {
@@ -429,11 +432,7 @@ fn geometry(urdf: &Urdf, poses: &HashMap<&str, Pose>) -> Geometry {
                 rotation: at.written.rotation,
                 position: at.written.position,
             },
-            parent: urdf
-                .joints
-                .iter()
-                .find(|j| j.child == link.name)
-                .map(|j| j.parent.clone()),
+            parent: parents.get(link.name.as_str()).map(|p| p.to_string()),
         }
     });
     let parts = urdf.links.iter().enumerate().flat_map(|(link, l)| {
