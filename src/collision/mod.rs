@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`scene`] | volumes and obstacles of a robot, pairs of them, gradients |
 //! | [`build`] | the scene of a robot file: volumes, floor, obstacles, pairs that matter |
-//! | [`srdf`] | pairs that an SRDF file disables |
+//! | `srdf` | pairs that an SRDF file disables |
 //! | [`clearance`] | least clearance of a motion over all time |
 
 pub mod build;
