@@ -1,7 +1,7 @@
 //! Random states that a regressor is judged at.
 
 use crate::dynamics::Samples;
-use crate::robot::{Motion, Robot};
+use crate::robot::Robot;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -11,18 +11,7 @@ pub fn random_states(robot: &Robot, count: usize, seed: u64) -> Samples {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut s = Samples::zeros(robot.dof(), count);
     for (j, joint) in robot.joints.iter().enumerate() {
-        let reach = if joint.motion == Motion::Revolute {
-            std::f64::consts::PI
-        } else {
-            0.5
-        };
-        let [low, high] = joint.limits.position;
-        let (low, high) = match (low.is_finite(), high.is_finite()) {
-            (true, true) => (low, high),
-            (true, false) => (low, low + 2.0 * reach),
-            (false, true) => (high - 2.0 * reach, high),
-            (false, false) => (-reach, reach),
-        };
+        let ([low, high], reach) = (joint.range(), joint.free_reach());
         let (middle, half) = (0.5 * (low + high), (0.5 * (high - low)).clamp(1e-3, reach));
         let finite = |x: f64, other: f64| if x.is_finite() && x > 0.0 { x } else { other };
         let v = finite(joint.limits.velocity, 2.0).min(100.0);

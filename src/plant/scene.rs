@@ -2,9 +2,9 @@
 
 use super::Plant;
 use crate::collision::clearance::{Fineness, Path, clearances};
-use crate::collision::{Scene, build};
+use crate::collision::{Clearance, Scene, build};
 use crate::error::{Result, Warning, WarningKind};
-use crate::robot::{Motion, Robot};
+use crate::robot::{Joint, Robot};
 use crate::trajectory::Fourier;
 use crate::trajectory::certificate::Proof;
 use crate::trajectory::extrema::extrema;
@@ -125,7 +125,9 @@ impl Plant {
         let Some(scene) = self.scene()? else {
             return Ok(None);
         };
-        let pairs = self.proven(&scene, fourier);
+        let path = SeriesPath::new(fourier);
+        let found = clearances(self.robot(), &scene, &path, Fineness::default());
+        let pairs = by_names(found.iter().map(|c| named(&scene, c)));
         let kept = |p: &PairClearance| p.bound >= p.margin - TOLERANCE;
         Ok(Some(ClearanceCertificate {
             satisfied: pairs.iter().all(kept),
@@ -135,35 +137,12 @@ impl Plant {
             always_near: scene.always_near.clone(),
         }))
     }
-
-    fn proven(&self, scene: &Scene, fourier: &Fourier) -> Vec<PairClearance> {
-        let path = SeriesPath::new(fourier);
-        let found = clearances(self.robot(), scene, &path, Fineness::default());
-        let all = found.into_iter().map(|c| {
-            let pair = &scene.pairs[c.pair];
-            (named(scene, c.pair, [c.met, c.time, c.bound]), pair.margin)
-        });
-        by_names(all.map(|(p, _)| p))
-    }
 }
 
 /// Random postures over the whole range of every joint (±π, ±0.5 m where there is none), from a fixed stream.
 fn postures(robot: &Robot) -> Vec<Vec<f64>> {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let ranges: Vec<[f64; 2]> = (robot.joints.iter())
-        .map(|j| {
-            let reach = match j.motion {
-                Motion::Revolute => std::f64::consts::PI,
-                Motion::Prismatic => 0.5,
-            };
-            match j.limits.position {
-                [low, high] if low.is_finite() && high.is_finite() => [low, high],
-                [low, _] if low.is_finite() => [low, low + 2.0 * reach],
-                [_, high] if high.is_finite() => [high - 2.0 * reach, high],
-                _ => [-reach, reach],
-            }
-        })
-        .collect();
+    let ranges: Vec<[f64; 2]> = robot.joints.iter().map(Joint::range).collect();
     let one = |rng: &mut ChaCha8Rng| -> Vec<f64> {
         let each = ranges.iter();
         each.map(|[low, high]| low + (high - low) * rng.random_range(0.0..1.0))
@@ -172,13 +151,14 @@ fn postures(robot: &Robot) -> Vec<Vec<f64>> {
     (0..POSTURES).map(|_| one(&mut rng)).collect()
 }
 
-fn named(scene: &Scene, pair: usize, [least, time, bound]: [f64; 3]) -> PairClearance {
-    let pair = &scene.pairs[pair];
+/// With the names of the two.
+fn named(scene: &Scene, found: &Clearance) -> PairClearance {
+    let pair = &scene.pairs[found.pair];
     PairClearance {
         between: scene.names(pair).map(String::from),
-        least,
-        time,
-        bound,
+        least: found.met,
+        time: found.time,
+        bound: found.bound,
         margin: pair.margin,
     }
 }

@@ -207,6 +207,26 @@ impl Joint {
         }
     }
 
+    /// How far it is taken to move to either side where its file states no end: π rad or 0.5 m.
+    pub(crate) fn free_reach(&self) -> f64 {
+        match self.motion {
+            Motion::Revolute => std::f64::consts::PI,
+            Motion::Prismatic => 0.5,
+        }
+    }
+
+    /// Its position limits, an end that is not stated taken from [`Joint::free_reach`].
+    pub(crate) fn range(&self) -> [f64; 2] {
+        let reach = self.free_reach();
+        let [low, high] = self.limits.position;
+        match (low.is_finite(), high.is_finite()) {
+            (true, true) => [low, high],
+            (true, false) => [low, low + 2.0 * reach],
+            (false, true) => [high - 2.0 * reach, high],
+            (false, false) => [-reach, reach],
+        }
+    }
+
     /// A joint without limits and without terms.
     pub fn new(name: &str, motion: Motion) -> Self {
         Joint {

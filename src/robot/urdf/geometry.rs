@@ -3,7 +3,6 @@
 //! Nothing here is an error of the file: what cannot be read becomes [`Form::Unreadable`] and is told where
 //! volumes are asked for. Identification needs none.
 
-use super::read::Source;
 use crate::robot::geometry::Form;
 use crate::robot::meant;
 use crate::solid::{Pose, Shape};
@@ -13,13 +12,14 @@ use roxmltree::Node;
 /// Most geometries of one link that are read.
 const MOST: usize = 256;
 
-/// The collision geometry of a link, else its visual one, in the frame of the link.
-pub(super) fn forms(source: &Source, link: Node) -> Vec<Form> {
+/// The collision geometry of a link, else its visual one, in the frame of the link; `line` tells where an element
+/// stands.
+pub(super) fn forms(link: Node, line: &dyn Fn(Node) -> usize) -> Vec<Form> {
     let of = |tag: &'static str| {
         link.children()
             .filter(move |n| n.is_element() && n.tag_name().name() == tag)
             .take(MOST)
-            .flat_map(|n| form(source, n))
+            .flat_map(|n| form(n, line))
             .collect::<Vec<_>>()
     };
     let collision = of("collision");
@@ -30,7 +30,7 @@ pub(super) fn forms(source: &Source, link: Node) -> Vec<Form> {
 }
 
 /// The form in one `<collision>`; none where it holds no `<geometry>`.
-fn form(source: &Source, node: Node) -> Option<Form> {
+fn form(node: Node, line: &dyn Fn(Node) -> usize) -> Option<Form> {
     let element = |node: Node<'_, '_>, name: &str| {
         node.children()
             .find(|n| n.is_element() && n.tag_name().name() == name)
@@ -39,7 +39,7 @@ fn form(source: &Source, node: Node) -> Option<Form> {
     let get = |id| node.document().get_node(id);
     let geometry = element(node, "geometry").and_then(get)?;
     let kind = geometry.children().find(Node::is_element)?;
-    let place = format!("line {}", source.line(kind));
+    let place = format!("line {}", line(kind));
     let pose = match element(node, "origin").and_then(get) {
         None => Some(Pose::identity()),
         Some(origin) => {

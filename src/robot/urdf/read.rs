@@ -25,7 +25,7 @@ const READ: [&str; 12] = [
 ];
 
 /// Name and text that errors refer to.
-pub(super) struct Source<'a> {
+struct Source<'a> {
     file: &'a Path,
     /// byte offsets at which lines begin
     lines: Vec<usize>,
@@ -44,7 +44,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    pub(super) fn line(&self, node: Node) -> usize {
+    fn line(&self, node: Node) -> usize {
         self.lines
             .partition_point(|&start| start <= node.range().start)
     }
@@ -339,7 +339,7 @@ fn link(source: &Source, node: Node, name: &str, what: &str) -> Result<Link> {
         name: name.to_string(),
         line: source.line(node),
         inertia,
-        forms: forms(source, node),
+        forms: forms(node, &|n| source.line(n)),
         warnings,
     })
 }

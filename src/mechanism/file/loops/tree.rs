@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::mechanism::loops::yaml::{self, Stand};
 use crate::robot::urdf::{Options, Urdf};
-use crate::robot::{Body, Inertia, Joint, Limits, Motion, Robot};
+use crate::robot::{Body, Inertia, Joint, Motion, Robot};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -100,18 +100,8 @@ fn split(robot: &mut Robot, joint: &str, axes: &[Vector3<f64>]) -> Result<(), St
             meant: None,
         };
         let coordinate = Joint {
-            name,
-            motion: Motion::Revolute,
             continuous: true,
-            limits: Limits::default(),
-            torque_noise: None,
-            position_resolution: None,
-            gear_ratio: None,
-            piston: None,
-            continuous_torque: None,
-            continuous_power: None,
-            terms: [0.0; 4],
-            identify: [false; 4],
+            ..Joint::new(&name, Motion::Revolute)
         };
         if k == 0 {
             robot.bodies[at] = body;
