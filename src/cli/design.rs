@@ -71,10 +71,11 @@ pub struct Args {
         allow_hyphen_values = true
     )]
     start: Option<Vec<f64>>,
-    /// Criterion: condition, d, a or e
-    #[arg(long, default_value = "condition", value_parser = named::<Criterion>)]
+    /// Criterion: known (as many base parameters as can be known to 10 % of their nominal value), condition
+    /// (condition number), d, a or e
+    #[arg(long, default_value = "known", value_parser = named::<Criterion>)]
     criterion: Criterion,
-    /// Matrix judged: invariant, raw, normalised or weighted [default: invariant; normalised for
+    /// Matrix judged by the other criteria: invariant, raw, normalised or weighted [default: invariant; normalised for
     /// parallel robots, whose parameters differ by orders of magnitude in size]
     #[arg(long, value_parser = named::<Condition>)]
     condition: Option<Condition>,
@@ -88,10 +89,10 @@ pub struct Args {
     /// Seed of the random starts
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
-    /// Most starts [default: 8, or no limit where a time limit is given]
+    /// Most starts [default: 12, or no limit where a time limit is given]
     #[arg(long, allow_negative_numbers = true)]
     starts: Option<usize>,
-    /// Wall clock of the optimisation in seconds [default: 60, or none where starts are given]
+    /// Wall clock of the optimisation in seconds [default: 25, or none where starts are given]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
     /// Threads, 0 for one per core

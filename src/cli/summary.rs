@@ -24,7 +24,7 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
         base.count(),
     );
     if let Some(e) = &assessment.excitation {
-        out.push_str(&excitation(e));
+        out.push_str(&excitation(e, &assessment.torque_noise));
     }
     if let Some(r) = record {
         let how = match r.status {
@@ -45,7 +45,7 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
     out
 }
 
-fn excitation(e: &Excitation) -> String {
+fn excitation(e: &Excitation, torque_noise: &[f64]) -> String {
     let mut out = String::new();
     let c = &e.condition;
     let _ = writeln!(
@@ -91,11 +91,7 @@ fn excitation(e: &Excitation) -> String {
         }
     }
     if let Some(p) = e.predictions.first() {
-        let good = e
-            .predictions
-            .iter()
-            .filter(|p| p.percent.is_some_and(|x| x <= 10.0))
-            .count();
+        let (good, _) = e.known(10.0);
         let worst = match p.percent {
             Some(x) => format!("{x:.1} %"),
             None => format!("{:.2e} {} about 0", p.std, p.unit),
@@ -105,6 +101,12 @@ fn excitation(e: &Excitation) -> String {
             "predicted: {good} of {} base parameters to 10 % or better\n           worst {}: {worst}",
             e.predictions.len(),
             p.parameter
+        );
+        let _ = writeln!(
+            out,
+            "torque elsewhere: uncertain by {:.1} % of its size, at {} random states",
+            100.0 * e.elsewhere.relative(torque_noise).min(1e298),
+            e.elsewhere.states
         );
     }
     out

@@ -10,8 +10,12 @@
 //! | D | `−½ ln det Λ_s / r` | volume of the confidence ellipsoid, per axis |
 //! | A | `½ ln(tr Λ_s⁻¹ / r)` | root mean square of the standard deviations |
 //! | E | `−½ ln λ_r` | longest axis of the ellipsoid |
+//! | known | `ln Σ ρ_i⁴/(1 + ρ_i⁴)` | parameters that will not be known |
 //!
-//! D and A are smooth where `Λ_s` is regular. `λ_1` and `λ_r` are not where eigenvalues meet, and at
+//! The last one ([`Targets`]) asks for what a user counts: parameters whose standard deviation is small
+//! **beside their value**. It is no function of eigenvalues alone, but as smooth as D and A.
+//!
+//! D, A and known are smooth where `Λ_s` is regular. `λ_1` and `λ_r` are not where eigenvalues meet, and at
 //! an optimum several do. There the **matrix** that the group of extreme eigenvalues lives in is
 //! linearised instead of the eigenvalue (Overton 1992): with `U` the eigenvectors of the `s`
 //! smallest ones,
@@ -26,6 +30,7 @@
 use super::information::{Evaluation, Information};
 use crate::error::{Error, Result};
 use crate::plant::Plant;
+use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
 /// What is minimised.
@@ -41,6 +46,49 @@ pub enum Criterion {
     A,
     /// smallest eigenvalue (maximised)
     E,
+    /// base parameters known to [`TARGET`] of their nominal value, by prior and motion together
+    Known,
+}
+
+/// A base parameter counts as known from this standard deviation, relative to its nominal value.
+pub const TARGET: f64 = 0.1;
+/// Standard deviation of the nominal values before the run, relative to them: a parameter that the motion cannot
+/// tell keeps it, and does not count as a loss that could be mended.
+const PRIOR: f64 = 1.0;
+/// A nominal value below this share of the largest of its unit is judged as if it were that large.
+const SMALLEST: f64 = 1e-3;
+
+/// What [`Criterion::Known`] compares with: of each base parameter the standard deviation `a_i = TARGET |φ_i|` that is
+/// good enough, and of how many samples the optimiser's stand for the experiment's.
+///
+/// With `C = (κ Λ + diag(PRIOR φ_i)⁻²)⁻¹` the covariance after an experiment of `κ` times the samples of `Λ`,
+/// `ρ_i² = C_ii / a_i²`. The criterion counts softly, `Σ ρ_i⁴/(1 + ρ_i⁴)`: it gains nothing where a parameter is known
+/// (`ρ_i ≪ 1`) or out of reach, and most where the motion decides. So flat a function leads nowhere from afar: the
+/// first phase of a start minimises `½ Σ ln(1 + ρ_i²) / r` instead.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Targets {
+    /// `a_i √κ`
+    scale: Vec<f64>,
+}
+
+impl Targets {
+    /// From the nominal values of the base parameters, their units, and `κ`, the samples of the experiment for
+    /// each of the optimiser's.
+    pub fn new(nominal: &[f64], units: &[&str], kappa: f64) -> Self {
+        let largest = |unit: &str| {
+            let same = nominal.iter().zip(units).filter(|(_, u)| **u == unit);
+            same.fold(0.0_f64, |m, (v, _)| m.max(v.abs()))
+        };
+        let scale = nominal.iter().zip(units).map(|(value, unit)| {
+            let size = value.abs().max(SMALLEST * largest(unit));
+            // all of a unit can be 0: such a parameter is not judged by its value
+            let size = if size > 0.0 { size } else { 1.0 };
+            TARGET * size * kappa.sqrt()
+        });
+        Targets {
+            scale: scale.collect(),
+        }
+    }
 }
 
 /// Which matrix the eigenvalues are taken of.
@@ -68,6 +116,15 @@ impl Condition {
             true => Condition::Normalised,
         }
     }
+}
+
+/// Exponents of the smoothing from which [`Criterion::Known`] counts.
+const COUNTED: f64 = 20.0;
+
+/// `Σ ρ⁴/(1 + ρ⁴)` of the `ρ²`.
+fn missed(variances: &[f64]) -> f64 {
+    let each = variances.iter().map(|v| v * v / (1.0 + v * v));
+    each.sum::<f64>().max(1e-300)
 }
 
 /// Group of extreme eigenvalues: `A_0 + Σ_k δ_k A_k`, in units of the extreme one.
@@ -100,15 +157,19 @@ pub struct Spectrum {
     /// `1/√G_kk` where normalised, 1 otherwise
     scale: Vec<f64>,
     normalised: bool,
+    /// of the matrix judged, where known parameters are counted
+    inverse: Option<Mat<f64>>,
 }
 
 /// Objective: criterion and matrix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Objective {
     /// what is minimised
     pub criterion: Criterion,
     /// of which matrix
     pub condition: Condition,
+    /// what [`Criterion::Known`] compares with
+    pub targets: Option<Targets>,
 }
 
 /// Most eigenvalues in a cluster at the small end, where they crowd.
@@ -125,22 +186,36 @@ impl Objective {
     /// When the eigenvalues do not converge (numbers that are not finite).
     pub fn spectrum(&self, gram: &Mat<f64>) -> Result<Spectrum> {
         let r = gram.nrows();
-        let normalised = self.condition == Condition::Normalised;
+        let known = self.targets.as_ref();
+        let normalised = known.is_none() && self.condition == Condition::Normalised;
         let scale: Vec<f64> = (0..r)
-            .map(|k| match normalised {
-                true => 1.0 / gram[(k, k)].max(f64::MIN_POSITIVE).sqrt(),
-                false => 1.0,
+            .map(|k| match (normalised, known) {
+                (_, Some(t)) => t.scale[k],
+                (true, None) => 1.0 / gram[(k, k)].max(f64::MIN_POSITIVE).sqrt(),
+                (false, None) => 1.0,
             })
             .collect();
-        let m = Mat::from_fn(r, r, |i, j| gram[(i, j)] * scale[i] * scale[j]);
-        let eigen = m.self_adjoint_eigen(Side::Lower).map_err(|_| {
+        let prior = known.map_or(0.0, |_| (TARGET / PRIOR).powi(2));
+        let m = Mat::from_fn(r, r, |i, j| {
+            gram[(i, j)] * scale[i] * scale[j] + if i == j { prior } else { 0.0 }
+        });
+        let failed = || {
             Error::Infeasible("the eigenvalues of the information matrix did not converge".into())
-        })?;
+        };
+        let eigen = m.self_adjoint_eigen(Side::Lower).map_err(|_| failed())?;
+        let inverse = match known {
+            Some(_) => {
+                let factor = m.llt(Side::Lower).map_err(|_| failed())?;
+                Some(factor.solve(Mat::<f64>::identity(r, r)))
+            }
+            None => None,
+        };
         Ok(Spectrum {
             values: (0..r).map(|k| eigen.S().column_vector()[k]).collect(),
             vectors: eigen.U().to_owned(),
             scale,
             normalised,
+            inverse,
         })
     }
 
@@ -156,6 +231,7 @@ impl Objective {
             Criterion::D => -0.5 * l.iter().map(|x| x.ln()).sum::<f64>() / r,
             Criterion::A => 0.5 * (l.iter().map(|x| 1.0 / x).sum::<f64>() / r).ln(),
             Criterion::E => -0.5 * low.ln(),
+            Criterion::Known => missed(&spectrum.variances()).ln(),
         }
     }
 
@@ -173,6 +249,10 @@ impl Objective {
         match self.criterion {
             Criterion::Condition => 0.5 * (upper() - lower()),
             Criterion::E => -0.5 * lower(),
+            Criterion::Known if p < COUNTED => {
+                let all = s.variances();
+                0.5 * all.iter().map(|v| v.ln_1p()).sum::<f64>() / l.len() as f64
+            }
             _ => self.value(s),
         }
     }
@@ -187,6 +267,9 @@ impl Objective {
     ) -> Vec<f64> {
         let l = &s.values;
         let r = l.len();
+        if self.criterion == Criterion::Known {
+            return s.known_gradient(info, e, p);
+        }
         let (low, high) = (l[0], l[r - 1]);
         let up: Vec<f64> = l.iter().map(|x| (x / high).powf(p)).collect();
         let down: Vec<f64> = l.iter().map(|x| (low / x).powf(p)).collect();
@@ -197,7 +280,7 @@ impl Objective {
                 Criterion::Condition => 0.5 * (up[k] / su - down[k] / sd) / l[k],
                 Criterion::E => -0.5 * down[k] / sd / l[k],
                 Criterion::D => -0.5 / (r as f64 * l[k]),
-                Criterion::A => -0.5 / (total * l[k] * l[k]),
+                _ => -0.5 / (total * l[k] * l[k]),
             })
             .collect();
         let list: Vec<usize> = (0..r)
@@ -324,6 +407,36 @@ impl Objective {
 }
 
 impl Spectrum {
+    /// Diagonal of the inverse matrix: `ρ_i²` of [`Targets`].
+    fn variances(&self) -> Vec<f64> {
+        let Some(inverse) = &self.inverse else {
+            return Vec::new();
+        };
+        (0..inverse.nrows()).map(|i| inverse[(i, i)]).collect()
+    }
+
+    /// Gradient of [`Criterion::Known`]: `∂ρ_i² = −u_iᵀ ∂Λ u_i` with `u_i` column `i` of the inverse, scaled.
+    fn known_gradient(&self, info: &Information, e: &mut Evaluation, p: f64) -> Vec<f64> {
+        let Some(inverse) = &self.inverse else {
+            return vec![0.0; info.len()];
+        };
+        let r = inverse.nrows();
+        let variances = self.variances();
+        let missed = missed(&variances);
+        let share = |v: f64| match p < COUNTED {
+            true => -0.5 / (r as f64 * (1.0 + v)),
+            false => -2.0 * v / ((1.0 + v * v).powi(2) * missed),
+        };
+        let columns = Mat::from_fn(r, r, |row, i| inverse[(row, i)] * self.scale[row]);
+        let g = info.quadratic_gradients(e, columns.as_ref());
+        (0..info.len())
+            .map(|x| {
+                let all = variances.iter().enumerate();
+                all.map(|(i, v)| share(*v) * g[(x, i)]).sum()
+            })
+            .collect()
+    }
+
     /// Indices of the extreme eigenvalues that a step may bring together.
     fn near(&self, largest: bool, most: usize) -> Vec<usize> {
         let r = self.values.len();

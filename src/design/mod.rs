@@ -26,6 +26,7 @@ pub(crate) mod path;
 mod problem;
 #[doc(hidden)]
 pub mod record;
+mod restore;
 mod result;
 mod rounds;
 pub(crate) mod settings;
@@ -43,8 +44,9 @@ use crate::collision::Scene;
 use crate::error::{Error, Result};
 use crate::plant::Plant;
 use crate::robot::{JointTerm, Robot};
-use crate::trajectory::Basis;
+use crate::trajectory::{Basis, RATE};
 use clearance::ClearanceLimits;
+use criterion::Targets;
 use information::Information;
 use limits::Limits;
 use mechanism_limits::MechanismLimits;
@@ -104,9 +106,20 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
     let basis = basis(moved, settings)?;
     let count = samples(plant.robot(), &basis.harmonics);
     let noise = plant.torque_noise().0;
-    let weights = (settings.condition == Condition::Weighted).then_some(noise.as_slice());
+    let counted = settings.criterion == Criterion::Known;
+    let weights =
+        (counted || settings.condition == Condition::Weighted).then_some(noise.as_slice());
     let transform = transform(&base, settings);
     let (period, derate) = (settings.period, settings.derate);
+    let targets = counted.then(|| {
+        let units: Vec<&str> = base.kept.iter().map(|&k| base.units[k]).collect();
+        let recorded = f64::from(settings.periods) * period * RATE;
+        Targets::new(
+            &base.project(&plant.values()),
+            &units,
+            recorded / count as f64,
+        )
+    });
     let info = Information::new(plant, &basis, period, count, transform, weights);
     let scene = plant.scene()?;
     first_certified(|tighter| {
@@ -126,6 +139,7 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
             info: &info,
             limits,
             path: path.as_deref(),
+            targets: targets.clone(),
         }
         .solve(begin, control)
     })
@@ -170,8 +184,9 @@ fn basis(robot: &Robot, settings: &Settings) -> Result<Basis> {
 
 /// `B` of the matrix that the settings ask for.
 fn transform(base: &BaseParameters, settings: &Settings) -> faer::Mat<f64> {
-    match settings.condition {
-        Condition::Invariant => base.row_space.clone(),
+    match (settings.criterion, settings.condition) {
+        (Criterion::Known, _) => base.selection(),
+        (_, Condition::Invariant) => base.row_space.clone(),
         _ => base.selection(),
     }
 }

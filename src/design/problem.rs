@@ -1,6 +1,6 @@
 //! One problem: the search for the best motion, and its certificate.
 
-use super::criterion::Objective;
+use super::criterion::{Objective, Targets};
 use super::information::Information;
 use super::limits::Limits;
 use super::path::PathLimits;
@@ -49,6 +49,8 @@ pub(super) struct Problem<'a> {
     pub info: &'a Information<'a>,
     pub limits: Limits,
     pub path: Option<&'a dyn PathLimits>,
+    /// where parameters that are known are counted
+    pub targets: Option<Targets>,
 }
 
 impl Problem<'_> {
@@ -62,10 +64,11 @@ impl Problem<'_> {
         let objective = Objective {
             criterion: settings.criterion,
             condition: settings.condition,
+            targets: self.targets.clone(),
         };
         let task = Task {
             info: self.info,
-            objective,
+            objective: &objective,
             limits: &self.limits,
             path: self.path,
             scale: &scale,

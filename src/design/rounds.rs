@@ -11,6 +11,8 @@ use rayon::prelude::*;
 pub(super) const ROUND: (usize, usize) = (8, 3);
 /// Random candidates of which the best becomes a start.
 const CANDIDATES: usize = 24;
+/// … and where there is something to touch, so that each is moved clear of it first.
+const CROWDED: usize = 6;
 /// Exponents of the p-norms that smooth the extreme eigenvalues, first and second phase.
 const NORMS: (f64, f64) = (10.0, 40.0);
 
@@ -35,9 +37,10 @@ impl Search {
         let first = self.next;
         let size = ROUND.0.min(most - first);
         self.next += size;
-        // most random motions touch something and are shrunk until little is left of them
-        let crowded = task.path.is_some_and(|p| !p.postures().is_empty());
-        let candidates = if crowded { 5 * CANDIDATES } else { CANDIDATES };
+        let candidates = match source.crowded() {
+            true => CROWDED,
+            false => CANDIDATES,
+        };
         let incumbent = self.best.as_ref().map(|(_, b)| b);
         let begun: Vec<Option<(usize, Iterate, bool)>> = (first..first + size)
             .into_par_iter()
@@ -45,10 +48,15 @@ impl Search {
                 if (incumbent.is_some() || number > first) && halt() {
                     return Ok(None);
                 }
-                // every other start of the later rounds disturbs the best so far
+                // every other start of the later rounds disturbs the best so far, and three of four where random
+                // motions are rarely good
+                let again = match source.crowded() {
+                    true => !number.is_multiple_of(4),
+                    false => number % 2 == 1,
+                };
                 let x = match incumbent {
-                    Some(b) if number % 2 == 1 => Some(source.disturbed(&b.x, number)),
-                    _ => source.random(number, candidates, halt),
+                    Some(b) if again => Some(source.disturbed(&b.x, number, halt)?),
+                    _ => source.random(number, candidates, halt)?,
                 };
                 let Some(x) = x else { return Ok(None) };
                 let mut it = Iterate::new(task, x);

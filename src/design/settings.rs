@@ -30,7 +30,7 @@ pub struct Settings {
     pub derate: f64,
     /// seed of the random starts
     pub seed: u64,
-    /// most starts; where neither this nor a time limit is given, 8 within 60 s
+    /// most starts; where neither this nor a time limit is given, 12 within 25 s
     #[serde(skip_serializing_if = "Option::is_none")]
     pub starts: Option<usize>,
     /// wall clock of the optimisation, s; given alone, starts go on until it ends
@@ -65,7 +65,7 @@ impl Settings {
     /// Most starts and seconds, with the defaults filled in.
     pub fn budget(&self) -> (usize, f64) {
         match (self.starts, self.time_limit) {
-            (None, None) => (8, 60.0),
+            (None, None) => (12, 25.0),
             (Some(starts), None) => (starts, f64::INFINITY),
             (None, Some(seconds)) => (usize::MAX, seconds),
             (Some(starts), Some(seconds)) => (starts, seconds),

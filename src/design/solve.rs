@@ -36,7 +36,7 @@ pub struct Task<'a> {
     /// information matrix and derivatives
     pub info: &'a Information<'a>,
     /// what is minimised
-    pub objective: Objective,
+    pub objective: &'a Objective,
     /// joint limits
     pub limits: &'a Limits,
     /// limits along the path: torques, actuators of closed chains
@@ -114,7 +114,9 @@ impl Iterate {
         halt: &(dyn Fn() -> bool + Sync),
     ) -> Result<bool> {
         let phase = match task.objective.criterion {
-            Criterion::D | Criterion::A if phase == Phase::Exact => return Ok(true),
+            Criterion::D | Criterion::A | Criterion::Known if phase == Phase::Exact => {
+                return Ok(true);
+            }
             _ => phase,
         };
         let mut state = State::new(task);

@@ -3,8 +3,10 @@
 use super::information::Evaluation;
 use super::limits::ExtremaWork;
 use super::path::PathMemory;
+use super::restore::restore;
 use super::solve::Task;
 use crate::dynamics::Samples;
+use crate::error::Result;
 use crate::robot::{Motion, Robot};
 use crate::trajectory::Basis;
 use rand::{Rng, SeedableRng};
@@ -62,12 +64,15 @@ impl Source<'_> {
     }
 
     /// The best of several random trajectories; `None` where none is feasible.
+    ///
+    /// # Errors
+    /// Only when numbers are not finite.
     pub fn random(
         &self,
         number: usize,
         candidates: usize,
         halt: &(dyn Fn() -> bool + Sync),
-    ) -> Option<Vec<f64>> {
+    ) -> Result<Option<Vec<f64>>> {
         let mut rng = self.stream(number);
         let mut e = Evaluation::default();
         let mut best: Option<(f64, Vec<f64>)> = None;
@@ -75,7 +80,12 @@ impl Source<'_> {
             if best.is_some() && halt() {
                 break;
             }
-            let Some(x) = self.candidate(&mut rng) else {
+            let (x, rest) = self.candidate(&mut rng);
+            let moved = match self.crowded() {
+                true => restore(self.task, &x, halt)?,
+                false => None,
+            };
+            let Some(x) = moved.or_else(|| self.fit_path(&x, &rest)) else {
                 continue;
             };
             let value = self.task.objective.evaluate(self.task.info, &x, &mut e);
@@ -83,11 +93,19 @@ impl Source<'_> {
                 best = Some((value, x));
             }
         }
-        best.map(|b| b.1)
+        Ok(best.map(|b| b.1))
     }
 
     /// A disturbed copy of a feasible trajectory, feasible too.
-    pub fn disturbed(&self, x: &[f64], number: usize) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// Only when numbers are not finite.
+    pub fn disturbed(
+        &self,
+        x: &[f64],
+        number: usize,
+        halt: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Vec<f64>> {
         let mut rng = self.stream(number);
         let m = self.basis.free();
         let size = rng.random_range(0.05..0.35);
@@ -99,16 +117,20 @@ impl Source<'_> {
         self.task
             .limits
             .pull_inside(&mut next, &mut ExtremaWork::default());
-        self.fit_path(&next, x).unwrap_or_else(|| x.to_vec())
+        let moved = match self.crowded() {
+            true => restore(self.task, &next, halt)?,
+            false => None,
+        };
+        let found = moved.or_else(|| self.fit_path(&next, x));
+        Ok(found.unwrap_or_else(|| x.to_vec()))
     }
 
-    /// A random trajectory inside the limits.
+    /// A random trajectory inside the limits of the joints, and the posture that it moves about.
     ///
     /// Amplitudes fall with the harmonic, the middle of the motion lies near the middle of the
     /// range, and the motion of each joint is scaled to the limit that it meets first, times a
-    /// random factor; then all joints are shrunk until the limits along the path hold. `None` where they do not
-    /// fit even at rest.
-    fn candidate(&self, rng: &mut ChaCha8Rng) -> Option<Vec<f64>> {
+    /// random factor.
+    fn candidate(&self, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<f64>) {
         let (basis, limits) = (self.basis, self.task.limits);
         let (m, h) = (basis.free(), basis.harmonics.len());
         let mut work = ExtremaWork::default();
@@ -157,7 +179,12 @@ impl Source<'_> {
             x.extend((0..m).map(|k| still[k] + factor * (full[k] - still[k])));
             rest.extend(still);
         }
-        self.fit_path(&x, &rest)
+        (x, rest)
+    }
+
+    /// Whether there is anything to touch.
+    pub fn crowded(&self) -> bool {
+        self.task.path.is_some_and(|p| !p.postures().is_empty())
     }
 
     /// A posture to move about, where the limits along the path know some; the more spacious ones more often.

@@ -70,6 +70,24 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
         e.map_or(Value::Null, |e| number(log_det(e.log_det))),
     );
     put("relative_std", relative_std(a));
+    put(
+        "known_to_10_percent",
+        e.map_or(Value::Null, |e| {
+            let (known, judged) = e.known(10.0);
+            json!({ "count": known, "of": judged })
+        }),
+    );
+    put(
+        "torque_uncertainty",
+        e.map_or(Value::Null, |e| {
+            json!({
+                "std": numbers(&e.elsewhere.std),
+                "rms": numbers(&e.elsewhere.rms),
+                "relative": number(e.elsewhere.relative(&a.torque_noise)),
+                "states": e.elsewhere.states,
+            })
+        }),
+    );
     put("limits", e.map_or(Value::Null, |e| limits(a, e)));
     put("clearance", e.map_or(Value::Null, clearance));
     put("seconds", number(seconds));

@@ -12,6 +12,7 @@
 //! diagonal gives the predicted standard deviation of every base parameter.
 
 mod clearance;
+mod elsewhere;
 #[doc(hidden)]
 pub mod json;
 #[doc(hidden)]
@@ -19,6 +20,7 @@ pub mod page;
 mod platform;
 
 pub use clearance::{Clearances, LinkVolumes};
+pub use elsewhere::TorqueUncertainty;
 pub use platform::Platform;
 
 use crate::base::BaseParameters;
@@ -79,6 +81,8 @@ pub struct Excitation {
     pub singular_values: Vec<f64>,
     /// base parameters, worst predicted first
     pub predictions: Vec<Prediction>,
+    /// torque uncertainty left at states that the motion did not visit
+    pub elsewhere: TorqueUncertainty,
     /// limits over all time
     pub certificate: Certificate,
     /// samples of the experiment that the prediction counts on: periods × samples a period
@@ -91,6 +95,14 @@ pub struct Excitation {
     /// the robot along the motion, for the page
     #[serde(skip)]
     pub(crate) view: Option<View>,
+}
+
+impl Excitation {
+    /// How many base parameters will be known to so many percent or better, of how many whose nominal value is not 0.
+    pub fn known(&self, percent: f64) -> (usize, usize) {
+        let judged = || self.predictions.iter().filter_map(|p| p.percent);
+        (judged().filter(|p| *p <= percent).count(), judged().count())
+    }
 }
 
 /// The report before the run, of a robot alone or with a trajectory.
@@ -143,12 +155,10 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
     let (condition, singular_values, log_det) =
         condition_numbers(&all.base, w.as_ref(), &all.torque_noise)?;
     let kept = all.base.select(w.as_ref());
-    let predictions = predict(
-        &all.values,
-        &all.base,
-        weighted(kept.as_ref(), &all.torque_noise).as_ref(),
-        f64::from(trajectory.periods),
-    );
+    let rows = weighted(kept.as_ref(), &all.torque_noise);
+    let covariance = covariance(rows.as_ref(), f64::from(trajectory.periods));
+    let predictions = predict(&all.values, &all.base, &covariance);
+    let elsewhere = TorqueUncertainty::of(plant, &all.base, &covariance)?;
     let certified = plant.certify(&trajectory.fourier, 1.0)?;
     if certified.proof == Proof::Stated {
         all.warnings.push(Warning::new(
@@ -193,6 +203,7 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         log_det,
         singular_values,
         predictions,
+        elsewhere,
         certificate: certified.actuators,
         platform,
         clearance,
@@ -290,23 +301,26 @@ fn ratio(s: &[f64]) -> f64 {
     }
 }
 
-/// Predicted standard deviations from the weighted regressor of one period, worst first.
-fn predict(
-    values: &[f64],
-    base: &BaseParameters,
-    weighted: MatRef<'_, f64>,
-    periods: f64,
-) -> Vec<Prediction> {
-    let nominal = base.project(values);
+/// Covariance of the base parameters from the weighted regressor of one period, infinite where it is singular.
+fn covariance(weighted: MatRef<'_, f64>, periods: f64) -> Mat<f64> {
+    let b = weighted.ncols();
     let information = weighted.transpose() * weighted;
-    let b = base.count();
-    let covariance = match information.llt(Side::Lower) {
-        Ok(llt) => llt.solve(Mat::<f64>::identity(b, b)),
+    match information.llt(Side::Lower) {
+        Ok(llt) => {
+            let one = Mat::from_fn(b, b, |i, j| if i == j { 1.0 / periods } else { 0.0 });
+            llt.solve(one)
+        }
         Err(_) => Mat::from_fn(b, b, |_, _| f64::INFINITY),
-    };
+    }
+}
+
+/// Predicted standard deviations, worst first.
+fn predict(values: &[f64], base: &BaseParameters, covariance: &Mat<f64>) -> Vec<Prediction> {
+    let nominal = base.project(values);
+    let b = base.count();
     let mut all: Vec<Prediction> = (0..b)
         .map(|a| {
-            let std = (covariance[(a, a)] / periods).sqrt().min(1e300);
+            let std = covariance[(a, a)].sqrt().min(1e300);
             Prediction {
                 parameter: base.name(a).to_string(),
                 combination: base.combination(a),

@@ -145,7 +145,7 @@ fn tiles(a: &Assessment) -> Markup {
             "no limits stated".into(),
         ),
     };
-    let (known, judged) = parameters::known(&e.predictions);
+    let (known, judged) = e.known(KNOWN);
     tiles.extend([
         worst,
         match e.platform {

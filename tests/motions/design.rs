@@ -5,13 +5,15 @@ use crate::common;
 use crate::common::compare::largest;
 
 use excite::base::BaseParameters;
-use excite::design::criterion::{Condition, Criterion, Objective};
+use excite::design::criterion::{Condition, Criterion, Objective, Targets};
 use excite::design::information::{Evaluation, Information};
 use excite::design::{Control, Design, Settings, Status, design, design_with};
 use excite::identifiability::assess;
 use excite::robot::{JointTerm, Robot};
 use excite::trajectory::{Basis, Ends, Grid};
 use excite::{Error, Plant, Result};
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
 use rand::Rng;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -80,6 +82,7 @@ fn smoothed_gradients_match_differences() {
             let objective = Objective {
                 criterion,
                 condition,
+                targets: None,
             };
             let value = |x: &[f64]| {
                 let mut e = Evaluation::default();
@@ -102,6 +105,82 @@ fn smoothed_gradients_match_differences() {
     }
 }
 
+/// Both forms of the criterion that counts known parameters, soft and softer, have exact gradients; its count is
+/// that of the covariance, whatever way that is computed.
+#[test]
+fn the_count_of_known_parameters_has_exact_gradients() {
+    for seed in 0..3 {
+        let (info, x) = problem(30 + seed, Condition::Weighted);
+        let r = info.order();
+        // nominal values of many sizes, so that some are known, some not, some out of reach
+        let nominal: Vec<f64> = (0..r)
+            .map(|k| 10f64.powf(-1.0 + 0.25 * (k % 9) as f64))
+            .collect();
+        let kappa = 3.0;
+        let objective = Objective {
+            criterion: Criterion::Known,
+            condition: Condition::Weighted,
+            targets: Some(Targets::new(&nominal, &vec!["kg"; r], kappa)),
+        };
+        for p in [10.0, 40.0] {
+            let value = |x: &[f64]| {
+                let mut e = Evaluation::default();
+                info.evaluate(x, &mut e);
+                objective.smooth_value(&objective.spectrum(&e.gram).unwrap(), p)
+            };
+            let mut e = Evaluation::default();
+            info.evaluate(&x, &mut e);
+            let s = objective.spectrum(&e.gram).unwrap();
+            let g = objective.smooth_gradient(&info, &mut e, &s, p);
+            let size = largest(&g);
+            for (k, g) in g.iter().enumerate() {
+                let d = difference(&x, k, &value);
+                assert!((d - g).abs() < 2e-4 * size, "{p} {k}: {d} {g}");
+            }
+        }
+        let mut e = Evaluation::default();
+        info.evaluate(&x, &mut e);
+        let prior = |k: usize| 1.0 / nominal[k].powi(2);
+        let precision = Mat::from_fn(r, r, |i, j| {
+            kappa * e.gram[(i, j)] + if i == j { prior(i) } else { 0.0 }
+        });
+        let covariance = precision
+            .llt(Side::Lower)
+            .unwrap()
+            .solve(Mat::<f64>::identity(r, r));
+        let missed: f64 = (0..r)
+            .map(|k| {
+                let rho = covariance[(k, k)] / (0.1 * nominal[k]).powi(2);
+                rho * rho / (1.0 + rho * rho)
+            })
+            .sum();
+        let value = objective.value(&objective.spectrum(&e.gram).unwrap());
+        assert!(
+            (value.exp() - missed).abs() < 1e-9 * missed,
+            "{value} {missed}"
+        );
+    }
+}
+
+/// The default of the command line knows more parameters than the best condition number does.
+#[test]
+fn more_parameters_are_known_where_they_are_counted() {
+    let plant = within_limits("ur5e");
+    let count = |criterion| {
+        let settings = Settings {
+            criterion,
+            ..small(3)
+        };
+        let d = design(&plant, &settings).unwrap();
+        let report = assess(&d.plant, Some(&d.trajectory)).unwrap();
+        let e = report.excitation.unwrap();
+        assert!(e.elsewhere.std.iter().all(|s| s.is_finite() && *s > 0.0));
+        e.known(10.0).0
+    };
+    let (known, condition) = (count(Criterion::Known), count(Criterion::Condition));
+    assert!(known > condition, "{known} {condition}");
+}
+
 /// The first-order model of the group of extreme eigenvalues: its extreme eigenvalue follows the
 /// true one along any direction, to first order, also for the second in the group.
 #[test]
@@ -111,6 +190,7 @@ fn clusters_predict_eigenvalues_to_first_order() {
         let objective = Objective {
             criterion: Criterion::Condition,
             condition,
+            targets: None,
         };
         let mut e = Evaluation::default();
         info.evaluate(&x, &mut e);

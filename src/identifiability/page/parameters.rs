@@ -2,18 +2,12 @@
 
 use super::KNOWN;
 use crate::base::{Identifiability, StandardParameter};
-use crate::identifiability::{Assessment, Excitation, Prediction};
+use crate::identifiability::{Assessment, Excitation};
 use crate::report::format::{NBSP, count, significant, unit};
 use crate::report::html::{self, Section};
 use crate::robot::{JointTerm, Motion, inertia};
 use crate::trajectory::RATE;
 use maud::{Markup, html};
-
-/// How many will be known to [`KNOWN`] percent or better, of how many whose nominal value is not 0.
-pub(super) fn known(predictions: &[Prediction]) -> (usize, usize) {
-    let judged = || predictions.iter().filter_map(|p| p.percent);
-    (judged().filter(|p| *p <= KNOWN).count(), judged().count())
-}
 
 /// Base parameters with their predicted uncertainty, worst first; without a trajectory what they
 /// are.

@@ -119,6 +119,9 @@ fn criterion(s: &Settings) -> String {
         Criterion::D => format!("D criterion: det^(−1/2r) ({matrix})"),
         Criterion::A => format!("A criterion: root of the mean variance ({matrix})"),
         Criterion::E => format!("E criterion: 1/smallest singular value ({matrix})"),
+        Criterion::Known => {
+            "base parameters that will not be known to 10\u{a0}% (a soft count)".to_string()
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The verdict in a sentence, built from the facts.
 
-use super::{KNOWN, clearance, parameters};
+use super::{KNOWN, clearance};
 use crate::collision::build::in_words;
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::mechanism::PoseKind;
@@ -126,7 +126,7 @@ pub fn verdict(a: &Assessment) -> Verdict {
         ),
         None => "the robot states no limits".into(),
     };
-    let (known, judged) = parameters::known(&e.predictions);
+    let (known, judged) = e.known(KNOWN);
     let lost = e
         .predictions
         .iter()
