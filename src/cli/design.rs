@@ -21,8 +21,8 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(
     long_about = "Design an exciting trajectory: a Fourier series for each joint (for each coordinate of \
-                  the platform, or each actuator, of a parallel robot) that minimises the \
-                  condition number of the regressor (or another criterion), inside position, \
+                  the platform, or each actuator, of a parallel robot) that lets most parameters become known \
+                  (or minimises the condition number of the regressor), inside position, \
                   velocity, acceleration, jerk and torque limits for all time.\n\nWrites \
                   trajectory.json, samples.csv, report.json and report.html. Ctrl-C keeps the best \
                   trajectory found so far.",

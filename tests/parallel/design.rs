@@ -88,6 +88,7 @@ fn gradients_are_the_differences_of_the_criterion() {
         let objective = Objective {
             criterion: Criterion::D,
             condition,
+            targets: None,
         };
         let mut e = Evaluation::default();
         let value = objective.evaluate(&info, &x, &mut e);
