@@ -67,9 +67,21 @@ fn excitation(e: &Excitation, torque_noise: &[f64]) -> String {
         ),
         None => writeln!(out, "limits: none stated"),
     };
-    match &e.clearance {
-        None => out.push_str("collisions: not looked at\n"),
-        Some(c) => {
+    let axes = e.platform.as_ref().and_then(|p| p.nearest_axes());
+    match (&e.clearance, axes) {
+        (None, Some(p)) => {
+            let _ = writeln!(
+                out,
+                "axes of legs and platform: closest {}, {:.1} mm at {:.2} s (never below {:.1} mm); surroundings not \
+                 looked at",
+                p.name,
+                1e3 * p.value,
+                p.time,
+                1e3 * p.bound
+            );
+        }
+        (None, None) => out.push_str("collisions: not looked at\n"),
+        (Some(c), _) => {
             let verdict = match c.certificate.satisfied {
                 true if c.certificate.unseen.is_empty() && c.certificate.always_near.is_empty() => {
                     "none"

@@ -161,6 +161,18 @@ fn relative_std(a: &Assessment) -> Value {
 
 /// Collisions: how near, where and when, and how that is known.
 fn clearance(e: &Excitation) -> Value {
+    if let Some(p) = e.platform.as_ref().and_then(|p| p.nearest_axes()) {
+        return json!({
+            "least": number(p.value),
+            "between": p.name.split(" to ").collect::<Vec<_>>(),
+            "time": number(p.time),
+            "bound": number(p.bound),
+            "margin": number(p.limit),
+            "proof": "bounded",
+            "of": "axes",
+            "satisfied": p.satisfied,
+        });
+    }
     let Some(c) = &e.clearance else {
         return json!({ "least": null, "between": null, "time": null, "proof": "not_checked" });
     };

@@ -3,7 +3,9 @@
 
 use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::mechanism::{Mechanism, MechanismCertificate, PoseUse, Segment, Task};
+use crate::mechanism::{
+    Mechanism, MechanismCertificate, PoseKind, PosePeak, PoseUse, Segment, Task,
+};
 use crate::trajectory::{RATE, Space};
 
 /// What the platform of a parallel robot does.
@@ -28,6 +30,13 @@ pub struct Platform {
 }
 
 impl Platform {
+    /// The two axes of legs, arms, rods or platform that come nearest, where their distance is asked for.
+    pub fn nearest_axes(&self) -> Option<&PosePeak> {
+        let all = self.certificate.pose.iter();
+        let distances = all.filter(|p| p.kind == PoseKind::Distance);
+        distances.min_by(|a, b| a.bound.total_cmp(&b.bound))
+    }
+
     /// Along one period of a motion of the task coordinates.
     ///
     /// # Errors

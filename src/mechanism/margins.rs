@@ -4,7 +4,7 @@
 //! Each is judged by its **use**, 1 at the limit: `angle/limit` of a cone, `margin/σ_min` of a
 //! singularity, `distance/gap` of two legs.
 
-use super::{Mechanism, Segment};
+use super::Mechanism;
 use nalgebra::Vector3;
 
 /// Part of the smallest singular values at home that a motion keeps where nothing else is stated.
@@ -17,7 +17,8 @@ pub struct Margins {
     pub actuation: f64,
     /// least `σ_min` of the constraint block
     pub constraint: f64,
-    /// least distance between the axes of two legs that do not meet, m; 0: not asked for
+    /// least distance between the axes of two legs, arms or rods that do not meet, and from the lines of the platform
+    /// that they do not carry, m; 0: not asked for
     pub distance: f64,
 }
 
@@ -102,24 +103,18 @@ impl Mechanism {
         }
     }
 
-    /// Pairs of legs, as indices into the segments of a pose, whose distance counts: of different
-    /// names, neither of them the platform, and apart at home by more than is asked for (those that
-    /// are not, meet in a joint).
+    /// Pairs of legs, or of a leg and the platform, as indices into the segments of a pose, whose distance counts: of
+    /// different names, and apart at home by more than is asked for (those that are not, meet in a joint).
     pub fn pairs(&self) -> Vec<(usize, usize)> {
         let gap = self.margins.distance;
         if gap <= 0.0 {
             return Vec::new();
         }
         let all = self.geometry.segments(&self.home);
-        let leg = |s: &Segment| s.name != "platform";
         let mut pairs = Vec::new();
         for j in 0..all.len() {
             for i in 0..j {
-                if leg(&all[i])
-                    && leg(&all[j])
-                    && all[i].name != all[j].name
-                    && distance(&all[i].ends, &all[j].ends) > gap
-                {
+                if all[i].name != all[j].name && distance(&all[i].ends, &all[j].ends) > gap {
                     pairs.push((i, j));
                 }
             }

@@ -37,6 +37,16 @@ pub(super) fn millimetres(x: f64) -> String {
 
 /// The section; what was not looked at where there are no clearances.
 pub(super) fn section(e: &Excitation) -> Section {
+    if let Some(p) = e.platform.as_ref().and_then(|p| p.nearest_axes()) {
+        let body = html! { p {
+            "The axes of legs, arms, rods and platform that do not meet in a joint come no nearer than "
+            (millimetres(p.bound)) ", by a stated bound between the samples (closest: " (p.name) ", "
+            (millimetres(p.value)) " at " (with_unit(p.time, 3, "s")) "; " code { "[margins] distance" } " asks for "
+            (millimetres(p.limit)) "). Choose that distance so that it holds both thicknesses. What stands around "
+            "the robot was not looked at."
+        } };
+        return Section::new("Clearance", body);
+    }
     let Some(c) = &e.clearance else {
         let body = html! { p {
             "Collisions were not looked at: the robot's files tell no volume of any link, or this was asked for. \

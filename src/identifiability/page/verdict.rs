@@ -14,6 +14,16 @@ const UNEXCITED: f64 = 1e7;
 
 /// What no verdict may leave out: what is known of collisions.
 fn collisions(e: &Excitation) -> String {
+    if let Some(p) = e.platform.as_ref().and_then(|p| p.nearest_axes()) {
+        return format!(
+            "The axes of legs, arms, rods and platform that do not meet keep {} by a stated bound (closest: {}, {} at \
+             {}). Collisions with what stands around were not checked.",
+            clearance::millimetres(p.bound),
+            p.name,
+            clearance::millimetres(p.value),
+            with_unit(p.time, 3, "s")
+        );
+    }
     let Some(c) = &e.clearance else {
         return "Collisions of the robot with itself and with its surroundings were not checked."
             .into();
