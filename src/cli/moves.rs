@@ -137,7 +137,11 @@ fn summary(name: &str, m: &Move) -> String {
         }
     }
     if m.slowed > 1.0 {
-        let _ = write!(out, ", slowed {:.2} times for torques", m.slowed);
+        let _ = write!(
+            out,
+            ", slowed {:.2} times for limits that no constant bounds",
+            m.slowed
+        );
     }
     out.push('\n');
     let fastest = (m.joints.iter()).max_by(|a, b| a.used[0].total_cmp(&b.used[0]));

@@ -81,12 +81,16 @@ fn table(found: &Rehearsal) -> String {
         );
         for l in &s.joints {
             let name: String = l.joint.chars().take(20).collect();
+            let velocity = match (l.velocity_used, l.velocity_by_position_used) {
+                (Some(a), Some(b)) => Some(a.max(b)),
+                (a, b) => a.or(b),
+            };
             let _ = writeln!(
                 out,
                 "{name:<20} {:>9.3} {:>6} {:>6} {:>6} {:>9.3} {:>6} {:>9.3} {:>9.3} {:>6}",
                 l.torque,
                 percent(l.torque_used),
-                percent(l.velocity_used),
+                percent(velocity),
                 percent(l.acceleration_used),
                 l.rms_torque,
                 percent(l.rms_used),

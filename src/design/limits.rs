@@ -7,9 +7,11 @@
 //! can exceed a limit by an amount of second order only, and does not get the chance:
 //! [`Limits::pull_inside`] finds the exact extrema of the new trajectory and shrinks the motion of
 //! that joint about its resting posture until they fit, so every iterate of a design is feasible
-//! for all time.
+//! for all time. Velocities by position bound a convex set, too: they are cones (`by_position`) where the
+//! others are rows, and shrink by the same rule.
 
-use crate::robot::Robot;
+use super::by_position::{Cone, peaks, stands};
+use crate::robot::{Robot, Side};
 use crate::trajectory::{Basis, Extremum, Series, Table, extrema_fast};
 
 /// Bounds of one derivative of one joint.
@@ -28,6 +30,8 @@ pub struct Limits {
     /// rows of the basis at the grid, per order: `rows[order][i]`, `m` numbers each
     grid: Vec<Vec<Vec<f64>>>,
     bands: Vec<Vec<Band>>,
+    /// velocities by position
+    sides: Vec<Vec<Side>>,
     omega: f64,
     /// posture of rest, where it is not the middle of the ranges
     home: Option<Vec<f64>>,
@@ -38,6 +42,23 @@ pub struct Limits {
 pub struct ExtremaWork {
     samples: Vec<f64>,
     found: Vec<Extremum>,
+    both: [Vec<f64>; 2],
+}
+
+/// Rows and cones of a subproblem.
+#[derive(Debug, Clone, Default)]
+pub struct Rows {
+    /// linear
+    pub linear: Vec<Row>,
+    /// second order
+    pub cones: Vec<Cone>,
+}
+
+impl Rows {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.linear.len() + self.cones.len()
+    }
 }
 
 /// One linear constraint `row · δ_j ≤ slack` of joint `joint`.
@@ -75,6 +96,7 @@ impl Limits {
             .map(|j| {
                 let l = &j.limits;
                 let [low, high] = l.position;
+                let turns = l.velocity_by_position.map(|v| v.range());
                 let mut bands = Vec::new();
                 if low.is_finite() || high.is_finite() {
                     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -82,6 +104,14 @@ impl Limits {
                         true => (middle - half * derate, middle + half * derate),
                         false => (low, high),
                     };
+                    // a motion that keeps its velocity by position stays between these
+                    let [a, b] = turns.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                    bands.push(Band {
+                        order: 0,
+                        low: low.max(a),
+                        high: high.min(b),
+                    });
+                } else if let Some([low, high]) = turns {
                     bands.push(Band {
                         order: 0,
                         low,
@@ -110,7 +140,23 @@ impl Limits {
                 bands
             })
             .collect();
+        let sides = robot
+            .joints
+            .iter()
+            .map(|j| {
+                let Some(v) = j.limits.derated(derate).velocity_by_position else {
+                    return Vec::new();
+                };
+                let room = v.position[1] - v.position[0];
+                let inner = |s: Side| Side {
+                    end: s.end - MARGIN * room,
+                    ..s
+                };
+                v.sides().map(inner).to_vec()
+            })
+            .collect();
         Limits {
+            sides,
             omega: std::f64::consts::TAU / period,
             basis: basis.clone(),
             table,
@@ -163,9 +209,9 @@ impl Limits {
 
     /// Rows for a subproblem around `x`: at the exact extrema and at the grid, those instants that
     /// use more than `near` of a limit (measured from the rest posture).
-    pub fn rows(&self, x: &[f64], near: f64, work: &mut ExtremaWork) -> Vec<Row> {
+    pub fn rows(&self, x: &[f64], near: f64, work: &mut ExtremaWork) -> Rows {
         let m = self.basis.free();
-        let mut rows = Vec::new();
+        let (mut rows, mut cones) = (Vec::new(), Vec::new());
         for (j, bands) in self.bands.iter().enumerate() {
             let x_j = &x[j * m..(j + 1) * m];
             let series = self.series(j, x_j);
@@ -184,8 +230,38 @@ impl Limits {
                     self.push(j, b, &self.row(b.order, e.time), x_j, near, &mut rows);
                 }
             }
+            for side in &self.sides[j] {
+                for rows in self.grid[0].iter().zip(&self.grid[1]) {
+                    self.cone(j, side, [rows.0, rows.1], x_j, near, &mut cones);
+                }
+                let both = &mut work.both;
+                for (t, _) in peaks(&self.table, &series, side, self.rest(j), near, both) {
+                    let rows = [self.row(0, t), self.row(1, t)];
+                    self.cone(j, side, [&rows[0], &rows[1]], x_j, near, &mut cones);
+                }
+            }
         }
-        rows
+        Rows {
+            linear: rows,
+            cones,
+        }
+    }
+
+    /// Adds the cone of one instant where it is near the limit.
+    fn cone(
+        &self,
+        j: usize,
+        side: &Side,
+        rows: [&[f64]; 2],
+        x_j: &[f64],
+        near: f64,
+        cones: &mut Vec<Cone>,
+    ) {
+        let [q, v] = rows.map(|row| row.iter().zip(x_j).map(|(r, x)| r * x).sum::<f64>());
+        let state = [side.sign * (q + self.basis.offset[j][0]), side.sign * v];
+        if stands(side, side.sign * self.rest(j), state, near) {
+            cones.push(Cone::new(j, side, rows, state));
+        }
     }
 
     /// Adds the row of one instant where it is near a limit.
@@ -216,7 +292,7 @@ impl Limits {
 
     /// Adds the instants at which `next` leaves a limit by more than a thousandth of it, as rows
     /// around `x`.
-    pub fn cut(&self, x: &[f64], next: &[f64], rows: &mut Vec<Row>, work: &mut ExtremaWork) {
+    pub fn cut(&self, x: &[f64], next: &[f64], rows: &mut Rows, work: &mut ExtremaWork) {
         let m = self.basis.free();
         for (j, bands) in self.bands.iter().enumerate() {
             let x_j = &x[j * m..(j + 1) * m];
@@ -240,9 +316,17 @@ impl Limits {
                             &self.row(b.order, e.time),
                             x_j,
                             f64::NEG_INFINITY,
-                            rows,
+                            &mut rows.linear,
                         );
                     }
+                }
+            }
+            for side in &self.sides[j] {
+                let both = &mut work.both;
+                for (t, _) in peaks(&self.table, &series, side, self.rest(j), 1.001, both) {
+                    let at = [self.row(0, t), self.row(1, t)];
+                    let near = f64::NEG_INFINITY;
+                    self.cone(j, side, [&at[0], &at[1]], x_j, near, &mut rows.cones);
                 }
             }
         }
@@ -289,6 +373,12 @@ impl Limits {
             for e in &work.found {
                 worst = worst.max((e.value - rest) / (b.high - rest).max(1e-300));
                 worst = worst.max((rest - e.value) / (rest - b.low).max(1e-300));
+            }
+        }
+        for side in &self.sides[j] {
+            let both = &mut work.both;
+            for (_, value) in peaks(&self.table, &series, side, self.rest(j), worst, both) {
+                worst = worst.max(value);
             }
         }
         worst

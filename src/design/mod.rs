@@ -13,6 +13,7 @@
 //! numbers and rounds are compared in a fixed order, so the result is the same for the same seed
 //! whatever the number of threads, unless a time limit ends the run.
 
+mod by_position;
 mod clearance;
 #[doc(hidden)]
 pub mod criterion;
@@ -32,7 +33,9 @@ mod rounds;
 pub(crate) mod settings;
 pub(crate) mod solve;
 pub(crate) mod start;
+mod tool;
 pub(crate) mod torque;
+mod torque_rate;
 
 pub use criterion::{Condition, Criterion};
 pub use record::{Record, Status};
@@ -54,7 +57,9 @@ use path::{All, PathLimits};
 use problem::{Problem, first_certified};
 use std::sync::Arc;
 use std::time::Instant;
+use tool::ToolLimits;
 use torque::TorqueLimits;
+use torque_rate::TorqueRateLimits;
 
 /// Designs an exciting trajectory: a Fourier series for each coordinate of the plant (the joints of
 /// a tree; the platform or the actuators of a closed chain), inside all limits for all time.
@@ -145,7 +150,7 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
     })
 }
 
-/// Torques and clearances of a tree, where there is anything to keep.
+/// Torques, the tool point and clearances of a tree, where there is anything to keep.
 fn along_tree<'a>(
     plant: &'a Plant,
     share: f64,
@@ -158,6 +163,12 @@ fn along_tree<'a>(
     let mut all: Vec<Box<dyn PathLimits + 'a>> = Vec::new();
     if let Some(torques) = TorqueLimits::new(robot, share) {
         all.push(Box::new(torques));
+    }
+    if let Some(rates) = TorqueRateLimits::new(robot, share, period) {
+        all.push(Box::new(rates));
+    }
+    if let Some(tool) = ToolLimits::new(robot, share) {
+        all.push(Box::new(tool));
     }
     if let Some(scene) = scene.filter(|s| !s.pairs.is_empty()) {
         let clear = ClearanceLimits::new(scene, robot, basis, period, tighter);

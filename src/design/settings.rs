@@ -136,6 +136,11 @@ impl Settings {
                     true => (middle - half, middle + half),
                     false => (low, high),
                 };
+                // beyond these no motion can begin that keeps its velocity by position
+                let (low, high) = match joint.limits.velocity_by_position.map(|v| v.range()) {
+                    Some([a, b]) => (low.max(a), high.min(b)),
+                    None => (low, high),
+                };
                 if !q.is_finite() || *q <= low || *q >= high {
                     return bad(format!(
                         "the start posture puts {} at {q}, outside its range {low:.4} to {high:.4}",

@@ -24,7 +24,7 @@
 
 use super::criterion::{Cluster, Criterion, Model, Objective};
 use super::information::{Evaluation, Information};
-use super::limits::{ExtremaWork, Limits, Row};
+use super::limits::{ExtremaWork, Limits, Rows};
 use super::path::{PathLimits, PathMemory, PathRow};
 use crate::conic::{Problem, Settings as ConicSettings};
 use crate::error::Result;
@@ -340,7 +340,7 @@ impl State {
         here: &Point,
         hessian: Option<&Mat<f64>>,
         damping: f64,
-        (rows, path_rows): (&[Row], &[PathRow]),
+        (rows, path_rows): (&Rows, &[PathRow]),
     ) {
         let (n, m) = (task.info.len(), task.free());
         let p = &mut self.problem;
@@ -366,7 +366,10 @@ impl State {
                 }
             }
         }
-        for row in rows {
+        for cone in &rows.cones {
+            cone.write(p, cone.joint * m, task.scale[cone.joint]);
+        }
+        for row in &rows.linear {
             let s = task.scale[row.joint];
             let entries = row
                 .row

@@ -81,7 +81,7 @@ fn toml_key(name: &str) -> String {
 }
 
 /// Room kept at the samples for what happens between them, as a fraction of the limit.
-const BETWEEN: f64 = 0.004;
+pub(super) const BETWEEN: f64 = 0.004;
 
 impl TorqueLimits {
     /// Effort limits times `derate`; `None` where no joint has one.
@@ -89,7 +89,12 @@ impl TorqueLimits {
         if robot.joints.iter().all(|j| j.limits.effort.is_infinite()) {
             return None;
         }
-        Some(TorqueLimits {
+        Some(Self::of(robot, derate))
+    }
+
+    /// [`TorqueLimits::new`], also where no joint has a limit.
+    pub(super) fn of(robot: &Robot, derate: f64) -> Self {
+        TorqueLimits {
             phi: robot.bodies.iter().flat_map(|b| b.inertia.0).collect(),
             terms: robot.joints.iter().map(|j| j.terms).collect(),
             names: robot.joint_names(),
@@ -102,7 +107,39 @@ impl TorqueLimits {
                     j.limits.effort * derate * (1.0 - BETWEEN) - coulomb
                 })
                 .collect(),
-        })
+        }
+    }
+
+    /// Derivatives of the torque of joint `j` at all samples with respect to the state.
+    pub(super) fn derivatives(
+        &self,
+        info: &Information,
+        motion: &Samples,
+        j: usize,
+        ws: &mut Workspace,
+        d: &mut Derivatives,
+    ) {
+        let count = motion.count;
+        let mut rates = vec![0.0; count * motion.dof];
+        rates[j * count..(j + 1) * count].fill(1.0);
+        info.tree().gradients(ws, &self.phi, motion, &rates, d);
+        for i in 0..count {
+            d.qd[j * count + i] += self.terms[j][JointTerm::Viscous as usize];
+            d.qdd[j * count + i] += self.terms[j][JointTerm::Armature as usize];
+        }
+    }
+
+    /// Gradient of that torque at sample `i` with respect to the free numbers.
+    pub(super) fn gradient(
+        info: &Information,
+        motion: &Samples,
+        d: &Derivatives,
+        i: usize,
+    ) -> Vec<f64> {
+        let (count, dof) = (motion.count, motion.dof);
+        let at = |g: &[f64]| -> Vec<f64> { (0..dof).map(|c| g[c * count + i]).collect() };
+        let (q, qd, qdd) = (at(&d.q), at(&d.qd), at(&d.qdd));
+        info.pull_back(i, [&q, &qd, &qdd])
     }
 
     /// Torques without Coulomb friction, joint-major.
@@ -179,7 +216,6 @@ impl PathLimits for TorqueLimits {
 
     fn rows(&self, info: &Information, _: &[f64], e: &mut Evaluation, from: f64) -> Vec<PathRow> {
         let (count, dof) = (e.motion.count, e.motion.dof);
-        let step = count * dof;
         let mut tau = Vec::new();
         let mut ws = Workspace::default();
         self.torques(info, &e.motion, &mut ws, &mut tau);
@@ -196,18 +232,9 @@ impl PathLimits for TorqueLimits {
             if near.is_empty() {
                 continue;
             }
-            let mut rates = vec![0.0; step];
-            rates[j * count..(j + 1) * count].fill(1.0);
-            info.tree()
-                .gradients(&mut ws, &self.phi, &e.motion, &rates, &mut d);
-            for i in 0..count {
-                d.qd[j * count + i] += self.terms[j][JointTerm::Viscous as usize];
-                d.qdd[j * count + i] += self.terms[j][JointTerm::Armature as usize];
-            }
+            self.derivatives(info, &e.motion, j, &mut ws, &mut d);
             for i in near {
-                let at = |g: &[f64]| -> Vec<f64> { (0..dof).map(|c| g[c * count + i]).collect() };
-                let (q, qd, qdd) = (at(&d.q), at(&d.qd), at(&d.qdd));
-                let mut gradient = info.pull_back(i, [&q, &qd, &qdd]);
+                let mut gradient = Self::gradient(info, &e.motion, &d, i);
                 let value = tau[j * count + i];
                 if value < 0.0 {
                     gradient.iter_mut().for_each(|g| *g = -*g);

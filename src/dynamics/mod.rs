@@ -18,6 +18,7 @@
 
 mod kernel;
 pub(crate) mod lanes;
+pub(crate) mod point;
 mod tree;
 
 #[doc(hidden)]

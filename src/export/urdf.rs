@@ -107,6 +107,17 @@ fn urdf(robot: &Robot) -> String {
         if !limit.is_empty() {
             let _ = writeln!(out, "    <limit{limit}/>");
         }
+        // the element has no ends of its own: they are those of <limit>
+        if let Some(v) = limits
+            .velocity_by_position
+            .filter(|v| body.joint_name == joint.name && v.position == limits.position)
+        {
+            let _ = writeln!(
+                out,
+                "    <position_based_velocity_limits deceleration_limit=\"{}\" velocity_offset=\"{}\"/>",
+                v.deceleration, v.offset
+            );
+        }
         if body.joint_name == joint.name {
             let _ = writeln!(
                 out,

@@ -5,7 +5,7 @@ use super::page::verdict::{verdict, violations};
 use crate::design::record::Record;
 use crate::identifiability::{Assessment, Excitation, Platform};
 use crate::trajectory::certificate::{JointCertificate, Peak};
-use crate::trajectory::{Proof, Space};
+use crate::trajectory::{Proof, SampledBound, Space};
 use serde_json::{Map, Value, json};
 
 /// What stands for infinity: JSON has none.
@@ -208,6 +208,26 @@ fn limits(a: &Assessment, e: &Excitation) -> Value {
         })),
         "violations": violations(&a.robot, e),
         "joints": c.joints.iter().map(joint).collect::<Vec<_>>(),
+        "tool": c.tool.as_ref().map(|t| json!({
+            "frame": t.frame,
+            "speed": t.speed.as_ref().map(sampled),
+            "acceleration": t.acceleration.as_ref().map(sampled),
+        })),
+    })
+}
+
+/// A magnitude that is sampled, with what is proven between the samples.
+fn sampled(b: &SampledBound) -> Value {
+    json!({
+        "max_on_grid": number(b.max_on_grid),
+        "time": number(b.time),
+        "between_grid_bound": number(b.between_grid_bound),
+        "bound": number(b.bound()),
+        "samples": b.samples,
+        "limit": number(b.limit),
+        "used": number(b.used),
+        "margin": number(b.margin),
+        "satisfied": b.satisfied(),
     })
 }
 
@@ -228,6 +248,17 @@ fn joint(c: &JointCertificate) -> Value {
         "velocity": peak(&c.velocity),
         "acceleration": peak(&c.acceleration),
         "jerk": peak(&c.jerk),
+        "velocity_by_position": c.velocity_by_position.as_ref().map(|p| json!({
+            "value": number(p.velocity.abs()),
+            "time": number(p.time),
+            "position": number(p.position),
+            "velocity": number(p.velocity),
+            "limit": number(p.limit.abs()),
+            "used": number(p.used),
+            "used_bound": number(p.bound),
+            "margin": number(p.limit.abs() - p.velocity.abs()),
+            "satisfied": p.satisfied(),
+        })),
         "torque": c.torque.as_ref().map(|t| json!({
             "max_on_grid": number(t.max_on_grid),
             "time": number(t.time),
@@ -240,6 +271,7 @@ fn joint(c: &JointCertificate) -> Value {
             "margin": optional(t.margin),
             "satisfied": t.satisfied(),
         })),
+        "torque_rate": c.torque_rate.as_ref().map(sampled),
     })
 }
 

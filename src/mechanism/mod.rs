@@ -428,6 +428,7 @@ impl Mechanism {
             path: self.robot.path.clone(),
             hash: self.robot.hash.clone(),
             geometry: Default::default(),
+            tool: None,
         }
     }
 

@@ -36,7 +36,9 @@ impl Reach {
             velocity: peak(0, limits.velocity),
             acceleration: peak(1, limits.acceleration),
             jerk: peak(2, limits.jerk),
+            velocity_by_position: None,
             torque: None,
+            torque_rate: None,
         }
     }
 }

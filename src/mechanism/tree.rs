@@ -140,6 +140,7 @@ impl Builder {
             path: None,
             hash: String::new(),
             geometry,
+            tool: None,
         }
     }
 }

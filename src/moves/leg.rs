@@ -10,7 +10,7 @@ pub struct Leg {
     pub profiles: Vec<Profile>,
     /// s
     pub duration: f64,
-    /// how much slower than the share of the limits allows, for the sake of torques; 1: not slower
+    /// how much slower than the share of the constant limits allows; 1: not slower
     pub slowed: f64,
     /// share of the limits that is used
     pub scale: f64,

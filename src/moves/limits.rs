@@ -1,7 +1,8 @@
 //! What a move may use of the limits, and which limits had to be assumed.
 
 use super::State;
-use crate::error::{Error, Result, Warning, WarningKind, number};
+use super::leg::Leg;
+use crate::error::{Error, Warning, WarningKind, number};
 use crate::plant::Plant;
 use crate::robot::{Limits, Motion};
 
@@ -19,7 +20,7 @@ pub const SLACK: f64 = 1e-9;
 ///
 /// # Errors
 /// [`Error::Argument`] for a limit that is zero, negative or not a number.
-pub fn limits(plant: &Plant) -> Result<(Vec<Limits>, Vec<Warning>)> {
+pub fn limits(plant: &Plant) -> crate::error::Result<(Vec<Limits>, Vec<Warning>)> {
     let mut warnings = Vec::new();
     let mut all = Vec::new();
     for joint in &plant.moved().joints {
@@ -105,11 +106,55 @@ pub fn raised(scaled: &[Limits], full: &[Limits], from: &State, to: &State) -> V
     .collect()
 }
 
+/// Velocity that counts as standing beside a velocity by position: what rounding leaves of none.
+pub fn still_at(limits: &Limits) -> f64 {
+    SLACK * limits.velocity
+}
+
+/// A leg slowed until no coordinate uses more than the leg's share of the velocity that its position leaves,
+/// for all time. A leg whose ends move may use all of it, and is not slowed.
+///
+/// # Errors
+/// In words, the coordinate that cannot.
+pub fn by_position(limits: &[Limits], names: &[String], leg: Leg) -> Result<Leg, String> {
+    let mut factor = 1.0_f64;
+    for ((l, name), profile) in limits.iter().zip(names).zip(&leg.profiles) {
+        let Some(limit) = l.velocity_by_position else {
+            continue;
+        };
+        let share = profile.share(&limit, still_at(l));
+        if share.is_infinite() {
+            let [low, high] = limit.range();
+            return Err(format!(
+                "joint {name} would move outwards beyond {} or {}, where its velocity by position leaves none",
+                number(low),
+                number(high)
+            ));
+        }
+        if !leg.resting && share > 1.0 + SLACK {
+            return Err(format!(
+                "joint {name} would be at {} % of the velocity that its position leaves",
+                number(100.0 * share)
+            ));
+        }
+        factor = factor.max(share / leg.scale);
+    }
+    Ok(match leg.resting && factor > 1.0 {
+        true => leg.stretched(factor),
+        false => leg,
+    })
+}
+
 /// Whether a state has all coordinates, is finite and within the limits, to [`SLACK`] of them.
 ///
 /// # Errors
 /// [`Error::Argument`] with the joint, what it is and what would be right.
-pub fn inside(plant: &Plant, limits: &[Limits], which: &str, state: &State) -> Result<()> {
+pub fn inside(
+    plant: &Plant,
+    limits: &[Limits],
+    which: &str,
+    state: &State,
+) -> crate::error::Result<()> {
     let joints = &plant.moved().joints;
     let n = joints.len();
     if [&state.q, &state.qd, &state.qdd]

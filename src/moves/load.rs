@@ -1,10 +1,13 @@
-//! What a leg asks of the actuators, sampled: torques, and of closed chains the motion of the actuators
+//! What a leg asks of the actuators, sampled: torques and their rates, the speed of the tool point, and of closed chains the motion of the actuators
 //! and the limits of the pose.
 
 use super::leg::Leg;
+use super::tool::ToolPeak;
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::plant::Plant;
+use crate::regressor::term_factor;
+use crate::robot::JointTerm;
 
 /// Samples of a leg: so many a second, within bounds.
 const RATE: f64 = 500.0;
@@ -26,6 +29,10 @@ pub struct TorquePeak {
     pub limit: Option<f64>,
     /// share of the limit
     pub used: Option<f64>,
+    /// largest rate of the smooth torque between two samples, N m/s or N/s; `None` without a limit of it
+    pub rate: Option<f64>,
+    /// share of the limit of the rate
+    pub rate_used: Option<f64>,
 }
 
 /// The limit that is used most.
@@ -52,8 +59,8 @@ impl Most {
     }
 }
 
-/// Samples of a leg, ends included.
-fn samples(leg: &Leg) -> Samples {
+/// Samples of a leg, ends included, and the time between two of them.
+fn samples(leg: &Leg) -> (Samples, f64) {
     let count = ((leg.duration * RATE) as usize).clamp(FEWEST, MOST) + 1;
     let mut x = Samples::zeros(leg.profiles.len(), count);
     for (k, p) in leg.profiles.iter().enumerate() {
@@ -62,7 +69,7 @@ fn samples(leg: &Leg) -> Samples {
             [x.q[at], x.qd[at], x.qdd[at]] = p.at(leg.duration * s as f64 / (count - 1) as f64);
         }
     }
-    x
+    (x, leg.duration / (count - 1) as f64)
 }
 
 /// The same samples `factor` times as slow; without end: at rest.
@@ -73,9 +80,18 @@ fn slower(x: &Samples, factor: f64) -> Samples {
     out
 }
 
-/// Largest torques of samples, raised in `peaks`.
-fn torques(plant: &Plant, x: &Samples, peaks: &mut [f64]) -> Result<()> {
+/// Largest torques of samples `step` seconds apart, raised in `peaks`, and their largest rates.
+fn torques(
+    plant: &Plant,
+    x: &Samples,
+    step: f64,
+    peaks: &mut [f64],
+    rates: &mut [f64],
+) -> Result<()> {
     let tau = plant.nominal_torque(x)?;
+    for (rate, own) in rates.iter_mut().zip(largest_rates(plant, x, &tau, step)) {
+        *rate = rate.max(own.unwrap_or(0.0));
+    }
     for (peak, row) in peaks.iter_mut().zip(tau.chunks_exact(x.count)) {
         *peak = row.iter().fold(
             *peak,
@@ -85,16 +101,54 @@ fn torques(plant: &Plant, x: &Samples, peaks: &mut [f64]) -> Result<()> {
     Ok(())
 }
 
+/// Largest rate of the torque of each actuator between samples `step` seconds apart, without Coulomb friction,
+/// which jumps; `None` where it has no limit.
+pub(super) fn largest_rates(
+    plant: &Plant,
+    x: &Samples,
+    tau: &[f64],
+    step: f64,
+) -> Vec<Option<f64>> {
+    let joints = plant.actuators();
+    let each = joints.iter().enumerate().map(|(a, joint)| {
+        if joint.limits.effort_rate.is_infinite() || !(step > 0.0) {
+            return None;
+        }
+        let coulomb = joint.terms[JointTerm::Coulomb as usize];
+        let smooth = |s: usize| {
+            let jump = coulomb * term_factor(JointTerm::Coulomb, x.at(a, s));
+            tau[a * x.count + s] - jump
+        };
+        let rates = (1..x.count).map(|s| ((smooth(s) - smooth(s - 1)) / step).abs());
+        Some(rates.fold(0.0, f64::max))
+    });
+    each.collect()
+}
+
 /// The limit that samples use most, `share` of the actuators' limits of velocity, acceleration and jerk
 /// being allowed.
-fn most(plant: &Plant, x: &Samples, share: f64) -> Result<Most> {
+fn most(plant: &Plant, x: &Samples, step: f64, share: f64) -> Result<Most> {
     let mut out = Most {
         used: 0.0,
         what: String::new(),
     };
     let joints = plant.actuators();
     let mut peaks = vec![0.0; joints.len()];
-    torques(plant, x, &mut peaks)?;
+    let mut rates = peaks.clone();
+    torques(plant, x, step, &mut peaks, &mut rates)?;
+    if let Some(tool) = ToolPeak::of(plant, x) {
+        for (what, used) in tool.shares() {
+            out.offer(used, || {
+                format!("{what} {}: {:.1} %", tool.frame, 100.0 * used)
+            });
+        }
+    }
+    for (joint, rate) in joints.iter().zip(&rates) {
+        let limit = joint.limits.effort_rate;
+        out.offer(rate / limit, || {
+            format!("rate of torque of {}: {rate:.4} of {limit:.4}", joint.name)
+        });
+    }
     for (joint, peak) in joints.iter().zip(&peaks) {
         let limit = joint.limits.effort;
         out.offer(peak / limit, || {
@@ -144,23 +198,24 @@ fn most(plant: &Plant, x: &Samples, share: f64) -> Result<Most> {
 /// Otherwise the limit that no slowness keeps, because the postures alone exceed it. A leg that may not
 /// be slowed (its ends move) is taken as it is or not at all.
 pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
-    let (x, may_slow) = (samples(leg), leg.resting);
+    let ((x, step), may_slow) = (samples(leg), leg.resting);
     let share = if may_slow { leg.scale } else { 1.0 };
-    let first = most(plant, &x, share)?;
+    let slow = |f: f64| most(plant, &slower(&x, f), f * step, share);
+    let first = most(plant, &x, step, share)?;
     if first.kept() {
         return Ok(Ok(leg.clone()));
     }
-    let held = most(plant, &slower(&x, SLOWEST), share)?;
+    let held = slow(SLOWEST)?;
     if !may_slow || !held.kept() {
         return Ok(Err(if may_slow { held } else { first }));
     }
     let (mut low, mut high) = (1.0, 2.0);
-    while high < SLOWEST && !most(plant, &slower(&x, high), share)?.kept() {
+    while high < SLOWEST && !slow(high)?.kept() {
         (low, high) = (high, 2.0 * high);
     }
     while high > 1.01 * low {
         let middle = 0.5 * (low + high);
-        match most(plant, &slower(&x, middle), share)?.kept() {
+        match slow(middle)?.kept() {
             true => high = middle,
             false => low = middle,
         }
@@ -168,16 +223,28 @@ pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Mos
     Ok(Ok(leg.stretched(high)))
 }
 
+/// Largest speed and acceleration of the tool point of all legs.
+pub fn tool(plant: &Plant, legs: &[Leg]) -> Option<ToolPeak> {
+    let each = legs
+        .iter()
+        .filter_map(|leg| ToolPeak::of(plant, &samples(leg).0));
+    each.reduce(|a, b| a.or(&b))
+}
+
 /// Largest torques of all legs.
 pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
     let joints = plant.actuators();
     let mut most = vec![0.0; joints.len()];
+    let mut rates = most.clone();
     for leg in legs {
-        torques(plant, &samples(leg), &mut most)?;
+        let (x, step) = samples(leg);
+        torques(plant, &x, step, &mut most, &mut rates)?;
     }
-    let each = joints.iter().zip(most);
+    let each = joints.iter().zip(most).zip(rates);
     Ok(each
-        .map(|(joint, value)| {
+        .map(|((joint, value), rate)| {
+            let fastest = joint.limits.effort_rate;
+            let rate = fastest.is_finite().then_some(rate);
             let limit = joint.limits.effort;
             let limit = limit.is_finite().then_some(limit);
             TorquePeak {
@@ -185,6 +252,8 @@ pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
                 value,
                 limit,
                 used: limit.map(|l| value / l),
+                rate,
+                rate_used: rate.map(|r| r / fastest),
             }
         })
         .collect())

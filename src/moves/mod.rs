@@ -16,7 +16,8 @@
 //! | `guard` | whether a path is free, proven |
 //! | `planner` | a way round what is in the way |
 //! | `plan` | all of it together |
-//! | `load` | torques along a leg, sampled |
+//! | `load` | torques and their rates along a leg, sampled |
+//! | `tool` | speed of the tool point, sampled |
 //! | `rehearsal` | a motion at several speeds: torques, power, samples, bytes |
 
 mod guard;
@@ -29,11 +30,13 @@ mod planner;
 mod profile;
 mod rehearsal;
 mod rest;
+mod tool;
 
 pub use guard::Least;
 pub use load::TorquePeak;
 pub use profile::Peaks;
 pub use rehearsal::{Load, Rehearsal, SPEEDS, Speed, rehearse};
+pub use tool::ToolPeak;
 
 use crate::collision::clearance::Path;
 use crate::collision::scene::Scene;
@@ -123,6 +126,8 @@ pub struct JointPeaks {
     pub peaks: Peaks,
     /// share of the full limit of velocity, acceleration and jerk that is used, assumed limits included
     pub used: [f64; 3],
+    /// share that it exceeds at no time of the velocity that its position leaves; `None` without such a limit
+    pub velocity_by_position: Option<f64>,
 }
 
 /// A move from one state to another.
@@ -141,7 +146,10 @@ pub struct Move {
     pub joints: Vec<JointPeaks>,
     /// largest torque of each actuator, sampled
     pub torques: Vec<TorquePeak>,
-    /// how much slower the slowest leg is for the sake of torques; 1: not slower
+    /// largest speed and acceleration of the tool point, sampled; `None` where it has no limits
+    pub tool: Option<ToolPeak>,
+    /// how much slower the slowest leg is for the sake of torques and their rates, of velocities by position and
+    /// of the tool point; 1: not slower
     pub slowed: f64,
     /// largest share of the limits that a leg was planned with: more than asked for only where an end in
     /// motion needs it
@@ -243,6 +251,7 @@ impl Move {
             "legs": self.legs.iter().map(|leg| leg.duration).collect::<Vec<_>>(),
             "joints": self.joints,
             "torques": self.torques,
+            "tool": self.tool,
             "clearance": self.clearance,
         })
     }

@@ -2,8 +2,8 @@
 
 use super::guard::{Blocked, Guard, Line};
 use super::leg::Leg;
-use super::limits::{inside, limits, raised, scaled};
-use super::load::{Most, bearable, peaks};
+use super::limits::{by_position, inside, limits, raised, scaled, still_at};
+use super::load::{Most, bearable, peaks, tool};
 use super::moving::{braked, through};
 use super::planner::{Found, search};
 use super::profile::Profile;
@@ -80,6 +80,10 @@ impl Planner<'_> {
 
     /// A leg that keeps all limits and touches nothing.
     fn accepted(&self, leg: Leg) -> Result<Result<Leg, Refusal>> {
+        let leg = match by_position(&self.full, &self.plant.coordinate_names(), leg) {
+            Ok(leg) => leg,
+            Err(why) => return Ok(Err(Refusal::Motion(why))),
+        };
         if let Some(guard) = &self.guard
             && let Err(blocked) = guard.free(&leg)
         {
@@ -152,6 +156,7 @@ impl Planner<'_> {
         match direct {
             Ok(leg) => return Ok((vec![leg], 0)),
             Err(Refusal::Load(most)) if resting => return Err(self.unbearable(&most)),
+            Err(Refusal::Motion(why)) if resting => return Err(self.impossible(&why)),
             Err(_) => {}
         }
         // out of the motion, through postures at rest, into the motion
@@ -191,6 +196,8 @@ impl Planner<'_> {
             self.settings.scale,
             true,
         );
+        let leg = by_position(&self.full, &self.plant.coordinate_names(), leg)
+            .map_err(|why| self.impossible(&why))?;
         bearable(self.plant, &leg)?.map_err(|most| self.unbearable(&most))
     }
 
@@ -281,6 +288,13 @@ impl Planner<'_> {
         ))
     }
 
+    fn impossible(&self, why: &str) -> Error {
+        Error::Infeasible(format!(
+            "robot {:?} cannot make this move: {why}; choose another posture",
+            self.plant.name()
+        ))
+    }
+
     fn unbearable(&self, most: &Most) -> Error {
         Error::Infeasible(format!(
             "the move of robot {:?} exceeds a limit however slow it is: {}; choose another posture, \
@@ -345,6 +359,12 @@ impl Planner<'_> {
                     most.acceleration / l.acceleration,
                     most.jerk / l.jerk,
                 ],
+                velocity_by_position: l.velocity_by_position.map(|v| {
+                    let each = whole
+                        .iter()
+                        .map(|leg| leg.profiles[k].share(&v, still_at(l)));
+                    each.fold(0.0, f64::max)
+                }),
             }
         });
         let mut found = Move {
@@ -354,6 +374,7 @@ impl Planner<'_> {
             via: via.collect(),
             joints: joints.collect(),
             torques: peaks(self.plant, &whole)?,
+            tool: tool(self.plant, &whole),
             slowed: whole.iter().map(|leg| leg.slowed).fold(1.0, f64::max),
             scale: whole.iter().map(|leg| leg.scale).fold(0.0, f64::max),
             clearance: None,

@@ -7,7 +7,12 @@
 //! Extrema are exact: positions turn where the quadratic `v` vanishes, velocities where the straight
 //! line `a` does.
 
+use crate::robot::VelocityByPosition;
+use crate::trajectory::by_position::share;
 use nalgebra::{Matrix3, Vector3};
+
+/// How closely the share of a velocity by position is bounded.
+const CLOSE: f64 = 1e-4;
 
 /// Position, velocity and acceleration.
 pub type Point = [f64; 3];
@@ -157,17 +162,61 @@ impl Profile {
         out
     }
 
-    /// Largest speed over `[from, to]`.
-    pub fn speed(&self, from: f64, to: f64) -> f64 {
-        let mut out = 0.0_f64;
+    /// Least and largest velocity over `[from, to]`.
+    fn velocities(&self, from: f64, to: f64) -> [f64; 2] {
+        let mut out = [f64::INFINITY, f64::NEG_INFINITY];
         self.within(from, to, |p, low, high| {
             let top = -p.state[2] / p.jerk;
             let inside = top > low && top < high;
             for s in [low, high, if inside { top } else { low }] {
-                out = out.max(p.at(s)[1].abs());
+                let v = p.at(s)[1];
+                out = [out[0].min(v), out[1].max(v)];
             }
         });
         out
+    }
+
+    /// Largest speed over `[from, to]`.
+    pub fn speed(&self, from: f64, to: f64) -> f64 {
+        let [low, high] = self.velocities(from, to);
+        high.max(-low).max(0.0)
+    }
+
+    /// What the share of a velocity by position exceeds at no time: intervals whose bound, the largest
+    /// velocity against the one allowed at the outermost position, exceeds the largest share found by more
+    /// than [`CLOSE`] are halved. Less than `still` counts as standing.
+    pub fn share(&self, limit: &VelocityByPosition, still: f64) -> f64 {
+        let mut found = 0.0_f64;
+        for side in limit.sides() {
+            let of = |q: f64, v: f64| match v <= still {
+                true => 0.0,
+                false => share(&side, q, v),
+            };
+            let outermost = |[low, high]: [f64; 2]| if side.sign > 0.0 { high } else { -low };
+            let bound = |from: f64, to: f64| {
+                let (q, v) = (self.range(from, to), self.velocities(from, to));
+                of(outermost(q), outermost(v))
+            };
+            let ends = self.pieces.iter().map(|p| (p.start, p.start + p.length));
+            let mut open: Vec<(f64, f64)> = ends.collect();
+            while let Some((from, to)) = open.pop() {
+                let most = bound(from, to);
+                let middle = 0.5 * (from + to);
+                let [q, v, _] = self.at(middle);
+                let here = of(side.sign * q, side.sign * v);
+                if most <= found * (1.0 + CLOSE) {
+                    continue;
+                }
+                if most <= here * (1.0 + CLOSE) || to - from < 1e-9 * self.duration {
+                    found = found.max(most);
+                    continue;
+                }
+                found = found.max(here);
+                open.extend([(from, middle), (middle, to)]);
+            }
+        }
+        // what was left out exceeds the largest share by no more than this
+        found * (1.0 + CLOSE)
     }
 
     /// Largest magnitudes over all time.
@@ -288,6 +337,79 @@ mod tests {
         let ([q, v, a], [sq, sv, sa]) = (p.at(0.77), slow.at(2.31));
         assert!((q - sq).abs() < 1e-14 && (v - 3.0 * sv).abs() < 1e-14);
         assert!((a - 9.0 * sa).abs() < 1e-13);
+    }
+
+    #[test]
+    fn the_share_of_a_velocity_by_position_is_bounded_closely() {
+        let limit = VelocityByPosition {
+            deceleration: 2.5,
+            offset: 0.25,
+            position: [-1.8, 1.8],
+        };
+        let ways: [(f64, f64, [(f64, f64); 7]); 3] = [
+            (
+                -1.2,
+                1.7,
+                [
+                    (0.1, 5.0),
+                    (0.2, 0.0),
+                    (0.1, -5.0),
+                    (0.9, 0.0),
+                    (0.1, -5.0),
+                    (0.2, 0.0),
+                    (0.1, 5.0),
+                ],
+            ),
+            (
+                1.0,
+                -1.75,
+                [
+                    (0.2, -9.0),
+                    (0.1, 0.0),
+                    (0.2, 9.0),
+                    (0.2, 0.0),
+                    (0.2, 9.0),
+                    (0.1, 0.0),
+                    (0.2, -9.0),
+                ],
+            ),
+            (
+                1.799,
+                0.0,
+                [
+                    (0.2, -9.0),
+                    (0.1, 0.0),
+                    (0.2, 9.0),
+                    (0.6, 0.0),
+                    (0.2, 9.0),
+                    (0.1, 0.0),
+                    (0.2, -9.0),
+                ],
+            ),
+        ];
+        for (from, to, phases) in ways {
+            let duration: f64 = phases.iter().map(|(h, _)| h).sum();
+            let p = Profile::new([from, 0.0, 0.0], &phases, [to, 0.0, 0.0], duration);
+            let bound = p.share(&limit, 1e-9);
+            let dense = (0..=100_000).map(|i| {
+                let [q, v, _] = p.at(duration * f64::from(i) * 1e-5);
+                let [low, high] = limit.at(q);
+                match v {
+                    v if v > 1e-9 => v / high,
+                    v if v < -1e-9 => v / low,
+                    _ => 0.0,
+                }
+            });
+            let dense = dense.fold(0.0, f64::max);
+            assert!(
+                bound >= dense && bound <= dense * 1.0003 + 1e-9,
+                "{bound} {dense}"
+            );
+            assert!(dense > 0.1 && dense.is_finite());
+        }
+        // beyond the position at which no velocity is left
+        let out = Profile::new([0.0; 3], &[(1.0, 1.0)], [1.795, 0.0, 0.0], 1.0);
+        assert!(out.share(&limit, 1e-9).is_infinite());
     }
 
     #[test]

@@ -9,6 +9,8 @@
 //!
 //! Integrals over the period are sums over even samples, exact for what has few harmonics.
 
+use super::load::largest_rates;
+use super::tool::ToolPeak;
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::plant::Plant;
@@ -32,10 +34,15 @@ pub struct Load {
     pub torque: f64,
     /// share of the limit of torque; `None` where none is stated
     pub torque_used: Option<f64>,
+    /// share of the limit of the rate of torque, between two samples and without Coulomb friction; `None` where
+    /// none is stated
+    pub torque_rate_used: Option<f64>,
     /// largest speed, rad/s or m/s
     pub velocity: f64,
     /// share of the limit of velocity
     pub velocity_used: Option<f64>,
+    /// share of the velocity that the position leaves, at a sample; `None` without such a limit
+    pub velocity_by_position_used: Option<f64>,
     /// largest acceleration
     pub acceleration: f64,
     /// share of the limit of acceleration
@@ -66,6 +73,8 @@ pub struct Speed {
     pub bytes: usize,
     /// the actuators
     pub joints: Vec<Load>,
+    /// the tool point; `None` where it has no limits
+    pub tool: Option<ToolPeak>,
     /// work of all actuators over one period, J: what friction takes
     pub work: f64,
 }
@@ -76,7 +85,9 @@ impl Speed {
         let all = self.joints.iter().flat_map(|l| {
             [
                 ("torque", l.torque_used),
+                ("rate of torque", l.torque_rate_used),
                 ("velocity", l.velocity_used),
+                ("velocity by position", l.velocity_by_position_used),
                 ("acceleration", l.acceleration_used),
                 ("continuous torque", l.rms_used),
                 ("continuous power", l.mean_power_used),
@@ -84,7 +95,11 @@ impl Speed {
             .into_iter()
             .filter_map(|(what, used)| Some((l.joint.as_str(), what, used?)))
         });
-        all.max_by(|a, b| a.2.total_cmp(&b.2))
+        let tool = self.tool.iter().flat_map(|t| {
+            t.shares()
+                .map(|(what, used)| (t.frame.as_str(), what, used))
+        });
+        all.chain(tool).max_by(|a, b| a.2.total_cmp(&b.2))
     }
 }
 
@@ -150,6 +165,7 @@ pub fn rehearse(
             samples: times.len(),
             bytes: length_of_samples(&slow, &times)?,
             joints,
+            tool: ToolPeak::of(plant, &x),
             work,
         })
     });
@@ -174,12 +190,17 @@ fn loads(plant: &Plant, x: &Samples, period: f64) -> Result<(Vec<Load>, f64)> {
     let tau = plant.nominal_torque(x)?;
     let moved = plant.actuator_motion(x)?;
     let n = x.count;
+    let rates = largest_rates(plant, x, &tau, period / n as f64);
     let mut work = 0.0;
     let joints = plant.actuators();
     let each = joints.iter().enumerate().map(|(a, joint)| {
         let rows = a * n..(a + 1) * n;
         let torque = &tau[rows.clone()];
-        let (v, w) = (&moved.qd[rows.clone()], &moved.qdd[rows]);
+        let (q, v, w) = (
+            &moved.q[rows.clone()],
+            &moved.qd[rows.clone()],
+            &moved.qdd[rows],
+        );
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
         let mean = |sum: f64| sum / n as f64;
         let power: Vec<f64> = torque.iter().zip(v).map(|(t, v)| t * v).collect();
@@ -192,8 +213,14 @@ fn loads(plant: &Plant, x: &Samples, period: f64) -> Result<(Vec<Load>, f64)> {
             joint: joint.name.clone(),
             torque: largest(torque),
             torque_used: share(largest(torque), l.effort),
+            torque_rate_used: rates[a].map(|r| r / l.effort_rate),
             velocity: largest(v),
             velocity_used: share(largest(v), l.velocity),
+            velocity_by_position_used: l.velocity_by_position.map(|limit| {
+                let each = q.iter().zip(v).map(|(q, v)| limit.share(*q, *v));
+                // JSON has no infinity
+                each.fold(0.0, f64::max).min(1e300)
+            }),
             acceleration: largest(w),
             acceleration_used: share(largest(w), l.acceleration),
             rms_torque: rms,

@@ -7,7 +7,8 @@ use crate::regressor::smooth_torque_function;
 use crate::robot::Robot;
 use crate::trajectory::Fourier;
 use crate::trajectory::certificate::{Certificate, Kind, Proof, Worst, certify};
-use crate::trajectory::torque::torque_certificate;
+use crate::trajectory::tool::tool_certificate;
+use crate::trajectory::torque::{rate_certificate, torque_certificate};
 
 /// Samples that the bound of the torques may spend.
 const TORQUE_SAMPLES: usize = 2000;
@@ -57,7 +58,10 @@ impl Certified {
                     Kind::Pose => w.joint.clone(),
                     kind => format!("{} of {}", kind.name(), w.joint),
                 };
-                format!("{what} at {:.1} % of its limit", 100.0 * w.used)
+                match w.used.is_finite() {
+                    true => format!("{what} at {:.1} % of its limit", 100.0 * w.used),
+                    false => format!("{what} without bound"),
+                }
             }
             None => "a limit that cannot be evaluated".into(),
         })
@@ -116,6 +120,7 @@ impl Plant {
                         .iter()
                         .map(|j| j.derated(derate))
                         .collect(),
+                    tool: self.robot.tool.as_ref().map(|t| t.derated(derate)),
                     ..self.robot.clone()
                 };
                 &derated
@@ -124,8 +129,13 @@ impl Plant {
         let kinematic = certify(robot, fourier)?;
         let torque = smooth_torque_function(robot, &self.tree);
         let bounds = torque_certificate(robot, fourier, TORQUE_SAMPLES, &torque)?;
+        let tool = tool_certificate(robot, fourier, TORQUE_SAMPLES)?;
+        let rates = rate_certificate(robot, fourier, TORQUE_SAMPLES, &torque)?;
         Ok(Certified {
-            actuators: kinematic.with_torque(bounds),
+            actuators: kinematic
+                .with_torque(bounds)
+                .with_torque_rate(rates)
+                .with_tool(tool),
             mechanism: None,
             proof: Proof::Exact,
             clearance: None,
@@ -153,6 +163,7 @@ fn overall(found: &MechanismCertificate) -> Certificate {
     }
     Certificate {
         joints: found.actuators.joints.clone(),
+        tool: None,
         satisfied: found.satisfied,
         worst,
     }

@@ -77,15 +77,19 @@ pub fn percent(fraction: f64) -> String {
 pub fn unit_of(kind: Kind, motion: Motion) -> &'static str {
     match (kind, motion) {
         (Kind::Position, Motion::Revolute) => "rad",
-        (Kind::Velocity, Motion::Revolute) => "rad/s",
+        (Kind::Velocity | Kind::VelocityByPosition, Motion::Revolute) => "rad/s",
         (Kind::Acceleration, Motion::Revolute) => "rad/s²",
         (Kind::Jerk, Motion::Revolute) => "rad/s³",
         (Kind::Torque, Motion::Revolute) => "N m",
+        (Kind::TorqueRate, Motion::Revolute) => "N m/s",
         (Kind::Position, Motion::Prismatic) => "m",
-        (Kind::Velocity, Motion::Prismatic) => "m/s",
+        (Kind::Velocity | Kind::VelocityByPosition, Motion::Prismatic) => "m/s",
         (Kind::Acceleration, Motion::Prismatic) => "m/s²",
         (Kind::Jerk, Motion::Prismatic) => "m/s³",
         (Kind::Torque, Motion::Prismatic) => "N",
+        (Kind::TorqueRate, Motion::Prismatic) => "N/s",
+        (Kind::ToolSpeed, _) => "m/s",
+        (Kind::ToolAcceleration, _) => "m/s²",
         (Kind::Pose, _) => "",
     }
 }

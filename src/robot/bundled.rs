@@ -49,12 +49,18 @@ macro_rules! bundled {
 /// them.
 pub const PARALLEL: [&str; 3] = ["hexapod", "h4", "delta"];
 
-static BUNDLED: [Bundled; 8] = [
+static BUNDLED: [Bundled; 9] = [
     bundled!(
         "panda",
         "Franka Emika Panda, 7 axes, joint torque sensors",
         "kinematics and limits: Franka control interface documentation; \
          inertia: Gaz et al., IEEE RA-L 4(4), 2019"
+    ),
+    bundled!(
+        "fr3",
+        "Franka Research 3, 7 axes, joint torque sensors",
+        "kinematics and limits: Franka control interface documentation; \
+         inertia: Franka Robotics, franka_description"
     ),
     bundled!(
         "ur10",

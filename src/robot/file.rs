@@ -3,6 +3,7 @@
 pub(crate) mod joint;
 pub(crate) mod names;
 mod template;
+mod tool;
 
 use super::geometry::{CollisionEntry, Entries, KeepInEntry, ShapeEntry};
 use super::urdf::{Options, Urdf};
@@ -38,6 +39,7 @@ struct RobotFile {
     joint: Vec<Spanned<JointEntry>>,
     #[serde(default)]
     collision: CollisionEntry,
+    tool: Option<tool::ToolEntry>,
     #[serde(default)]
     volume: Vec<ShapeEntry>,
     #[serde(default)]
@@ -404,6 +406,9 @@ fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
             let warnings = &mut robot.warnings;
             joint_values(source, entry, &what, joint, warnings)?;
         }
+    }
+    if let Some(tool) = &file.tool {
+        robot.tool = Some(tool.tool(source, &robot.geometry.links)?);
     }
     let surroundings = Entries {
         collision: &file.collision,

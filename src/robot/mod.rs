@@ -14,12 +14,17 @@ pub mod geometry;
 pub(crate) mod inertia;
 pub(crate) mod meant;
 mod parameter;
+pub(crate) mod tool;
 pub(crate) mod urdf;
+mod velocity_by_position;
 
 pub use inertia::Inertia;
 #[doc(hidden)]
 pub use meant::Placement;
 pub use parameter::{Column, Parameter};
+pub use tool::Tool;
+pub(crate) use velocity_by_position::Side;
+pub use velocity_by_position::VelocityByPosition;
 
 use crate::error::Warning;
 use nalgebra::{Matrix3, Vector3};
@@ -86,6 +91,10 @@ pub struct Limits {
     pub jerk: f64,
     /// torque or force, N m or N
     pub effort: f64,
+    /// rate of the torque or force, N m/s or N/s
+    pub effort_rate: f64,
+    /// velocity that shrinks towards the ends of a range
+    pub velocity_by_position: Option<VelocityByPosition>,
 }
 
 impl Default for Limits {
@@ -96,12 +105,14 @@ impl Default for Limits {
             acceleration: f64::INFINITY,
             jerk: f64::INFINITY,
             effort: f64::INFINITY,
+            effort_rate: f64::INFINITY,
+            velocity_by_position: None,
         }
     }
 }
 
 impl Limits {
-    /// All limits times `factor`; positions keep the middle of their range.
+    /// All limits times `factor`; positions keep the middle of their range, a velocity by position its ends.
     pub fn derated(&self, factor: f64) -> Self {
         let mut l = *self;
         let [low, high] = l.position;
@@ -113,6 +124,8 @@ impl Limits {
         l.acceleration *= factor;
         l.jerk *= factor;
         l.effort *= factor;
+        l.effort_rate *= factor;
+        l.velocity_by_position = l.velocity_by_position.map(|v| v.derated(factor));
         l
     }
 }
@@ -215,10 +228,17 @@ impl Joint {
         }
     }
 
-    /// Its position limits, an end that is not stated taken from [`Joint::free_reach`].
+    /// Its position limits, an end that is not stated taken from [`Joint::free_reach`], without what lies beyond
+    /// the positions at which a velocity by position makes it turn.
     pub(crate) fn range(&self) -> [f64; 2] {
         let reach = self.free_reach();
-        let [low, high] = self.limits.position;
+        let [low, high] = match self.limits.velocity_by_position.map(|v| v.range()) {
+            Some([a, b]) => [
+                self.limits.position[0].max(a),
+                self.limits.position[1].min(b),
+            ],
+            None => self.limits.position,
+        };
         match (low.is_finite(), high.is_finite()) {
             (true, true) => [low, high],
             (true, false) => [low, low + 2.0 * reach],
@@ -280,6 +300,8 @@ pub struct Robot {
     /// volumes of its links and what stands around it; not serialised
     #[serde(skip)]
     pub geometry: geometry::Geometry,
+    /// limits of its tool point
+    pub tool: Option<Tool>,
 }
 
 impl Robot {

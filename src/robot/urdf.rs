@@ -49,6 +49,8 @@ pub struct StatedLimits {
     pub velocity: Option<f64>,
     /// N m or N
     pub effort: Option<f64>,
+    /// a velocity by position is stated beside the joint's other values
+    pub by_position: bool,
 }
 
 /// A URDF as it is written: links and joints in document order, numbers checked, nothing merged.
@@ -186,6 +188,7 @@ struct UrdfJoint {
     /// the three as they are meant
     meant: Placement,
     limit: Option<Limit>,
+    by_position: Option<ByPosition>,
     mimic: Option<Mimic>,
     damping: f64,
     friction: f64,
@@ -199,6 +202,14 @@ struct Limit {
     upper: Option<f64>,
     velocity: Option<f64>,
     effort: Option<f64>,
+}
+
+/// `<position_based_velocity_limits>` of Franka's robot descriptions, as written.
+#[derive(Debug, Clone, Copy)]
+struct ByPosition {
+    line: usize,
+    deceleration: Option<f64>,
+    offset: Option<f64>,
 }
 
 /// `<mimic>`: `q = multiplier · q_joint + offset`.

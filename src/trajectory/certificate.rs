@@ -1,7 +1,9 @@
 //! The certificate: position, velocity, acceleration and jerk limits over all time.
 
+use super::by_position::{PositionPeak, velocity_by_position};
 use super::extrema::{Extremum, extrema};
 use super::fourier::Fourier;
+use super::tool::ToolCertificate;
 use crate::error::{Error, Result};
 use crate::robot::Robot;
 
@@ -20,8 +22,20 @@ pub enum Kind {
     Acceleration,
     /// jerk
     Jerk,
+    /// velocity against the one that is allowed at the position
+    #[serde(rename = "velocity_by_position")]
+    VelocityByPosition,
     /// torque or force
     Torque,
+    /// rate of the torque or force
+    #[serde(rename = "torque_rate")]
+    TorqueRate,
+    /// speed of the tool point
+    #[serde(rename = "tool_speed")]
+    ToolSpeed,
+    /// acceleration of the tool point
+    #[serde(rename = "tool_acceleration")]
+    ToolAcceleration,
     /// of the pose of a parallel robot: passive joint, singularity, distance
     Pose,
 }
@@ -34,7 +48,11 @@ impl Kind {
             Kind::Velocity => "velocity",
             Kind::Acceleration => "acceleration",
             Kind::Jerk => "jerk",
+            Kind::VelocityByPosition => "velocity by position",
             Kind::Torque => "torque",
+            Kind::TorqueRate => "torque rate",
+            Kind::ToolSpeed => "speed",
+            Kind::ToolAcceleration => "acceleration",
             Kind::Pose => "margin",
         }
     }
@@ -189,6 +207,40 @@ impl TorqueBound {
     }
 }
 
+/// The largest magnitude of a quantity that is sampled, over all time, against its limit.
+///
+/// At no time is the magnitude larger than [`SampledBound::bound`]
+/// `= max_on_grid + between_grid_bound`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct SampledBound {
+    /// largest magnitude at a sample
+    pub max_on_grid: f64,
+    /// when, s into the period
+    pub time: f64,
+    /// it exceeds `max_on_grid` by no more than this between samples (rigorous)
+    pub between_grid_bound: f64,
+    /// samples taken
+    pub samples: usize,
+    /// limit
+    pub limit: f64,
+    /// `max_on_grid / limit`
+    pub used: f64,
+    /// `limit − max_on_grid`
+    pub margin: f64,
+}
+
+impl SampledBound {
+    /// The magnitude is larger than this at no time.
+    pub fn bound(&self) -> f64 {
+        self.max_on_grid + self.between_grid_bound
+    }
+
+    /// Whether the bound stays within the limit.
+    pub fn satisfied(&self) -> bool {
+        self.bound() <= self.limit * (1.0 + TOLERANCE)
+    }
+}
+
 /// How it is known that kinematic limits hold between the samples, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -214,14 +266,22 @@ pub struct JointCertificate {
     pub acceleration: Peak,
     /// largest jerk
     pub jerk: Peak,
+    /// largest share of the velocity by position, where there is such a limit
+    #[serde(default)]
+    pub velocity_by_position: Option<PositionPeak>,
     /// largest torque, where it was asked for
     pub torque: Option<TorqueBound>,
+    /// largest rate of the torque, where it has a limit and was asked for
+    #[serde(default)]
+    pub torque_rate: Option<SampledBound>,
 }
 
 impl JointCertificate {
     /// Kind, used fraction and whether it holds, of every limit.
     fn verdicts(&self) -> impl Iterator<Item = (Kind, Option<f64>, bool)> {
         let torque = self.torque.as_ref();
+        let by_position = self.velocity_by_position.as_ref();
+        let rate = self.torque_rate.as_ref();
         [
             (
                 Kind::Position,
@@ -240,9 +300,19 @@ impl JointCertificate {
             ),
             (Kind::Jerk, self.jerk.used, self.jerk.satisfied()),
             (
+                Kind::VelocityByPosition,
+                by_position.map(|p| p.used),
+                by_position.is_none_or(|p| p.satisfied()),
+            ),
+            (
                 Kind::Torque,
                 torque.and_then(|t| t.used),
                 torque.is_none_or(|t| t.satisfied()),
+            ),
+            (
+                Kind::TorqueRate,
+                rate.map(|r| r.used),
+                rate.is_none_or(|r| r.satisfied()),
             ),
         ]
         .into_iter()
@@ -265,6 +335,9 @@ pub struct Worst {
 pub struct Certificate {
     /// joint by joint
     pub joints: Vec<JointCertificate>,
+    /// the tool point, where it has limits
+    #[serde(default)]
+    pub tool: Option<ToolCertificate>,
     /// whether every limit holds (to [`TOLERANCE`] of its range)
     pub satisfied: bool,
     /// the most used limit; `None` where there are no limits
@@ -292,6 +365,7 @@ impl Certificate {
         }
         Certificate {
             joints,
+            tool: None,
             satisfied,
             worst,
         }
@@ -303,6 +377,40 @@ impl Certificate {
         let mut joints = self.joints;
         for (joint, bound) in joints.iter_mut().zip(torque) {
             joint.torque = Some(bound);
+        }
+        Certificate::new(joints)
+    }
+}
+
+impl Certificate {
+    /// This certificate with what is known of the tool point.
+    pub fn with_tool(self, tool: Option<ToolCertificate>) -> Self {
+        let mut all = Certificate { tool, ..self };
+        let Some(tool) = &all.tool else { return all };
+        all.satisfied &= tool.satisfied();
+        let both = [
+            (Kind::ToolSpeed, &tool.speed),
+            (Kind::ToolAcceleration, &tool.acceleration),
+        ];
+        for (kind, bound) in both {
+            if let Some(b) = bound
+                && all.worst.as_ref().is_none_or(|w| b.used > w.used)
+            {
+                all.worst = Some(Worst {
+                    joint: tool.frame.clone(),
+                    kind,
+                    used: b.used,
+                });
+            }
+        }
+        all
+    }
+
+    /// This certificate with the rates of [`rate_certificate`](super::rate_certificate), one per joint.
+    pub fn with_torque_rate(self, rates: Vec<Option<SampledBound>>) -> Self {
+        let mut joints = self.joints;
+        for (joint, rate) in joints.iter_mut().zip(rates) {
+            joint.torque_rate = rate;
         }
         Certificate::new(joints)
     }
@@ -357,7 +465,12 @@ pub fn certify(robot: &Robot, trajectory: &Fourier) -> Result<Certificate> {
                 velocity: peak(1, joint.limits.velocity),
                 acceleration: peak(2, joint.limits.acceleration),
                 jerk: peak(3, joint.limits.jerk),
+                velocity_by_position: joint.limits.velocity_by_position.map(|limit| {
+                    let series = &trajectory.joints[j];
+                    velocity_by_position(trajectory.period, &trajectory.harmonics, series, &limit)
+                }),
                 torque: None,
+                torque_rate: None,
             }
         })
         .collect();

@@ -76,6 +76,18 @@ impl Series {
     }
 }
 
+/// Position and velocity of a series at a time, straight from its coefficients.
+pub(crate) fn evaluate_series(series: &Series, harmonics: &[u32], omega: f64, t: f64) -> [f64; 2] {
+    let (mut q, mut v) = (series.constant, 0.0);
+    for ((&s, &c), &h) in series.sin.iter().zip(&series.cos).zip(harmonics) {
+        let w = f64::from(h) * omega;
+        let (sin, cos) = (w * t).sin_cos();
+        q += s * sin + c * cos;
+        v += w * (s * cos - c * sin);
+    }
+    [q, v]
+}
+
 /// Coefficients of `sin` and `cos` after `order` differentiations at angular frequency `w`.
 #[inline]
 pub(crate) fn differentiated(s: f64, c: f64, w: f64, order: u32) -> (f64, f64) {

@@ -7,8 +7,10 @@
 //! files (`file`, [`samples`]).
 
 pub(crate) mod basis;
+pub(crate) mod by_position;
 #[doc(hidden)]
 pub mod certificate;
+mod enclose;
 #[doc(hidden)]
 pub mod extrema;
 mod extrema_fast;
@@ -20,17 +22,22 @@ pub mod jets;
 #[doc(hidden)]
 pub mod samples;
 pub(crate) mod table;
+pub(crate) mod tool;
 pub(crate) mod torque;
 
 #[doc(hidden)]
 pub use basis::Basis;
 pub use basis::Ends;
-pub use certificate::{Certificate, JointCertificate, Peak, Proof, Range, TorqueBound, certify};
+pub use by_position::PositionPeak;
+pub use certificate::{
+    Certificate, JointCertificate, Peak, Proof, Range, SampledBound, TorqueBound, certify,
+};
 #[doc(hidden)]
 pub use extrema::{Extrema, Extremum, extrema};
 #[doc(hidden)]
 pub use extrema_fast::extrema_fast;
 pub use file::{Space, Trajectory};
+pub(crate) use fourier::evaluate_series;
 pub use fourier::{Fourier, Series};
 #[doc(hidden)]
 pub use fourier::{RATE, sample_period};
@@ -39,5 +46,6 @@ pub use grid::Grid;
 pub use samples::Samples;
 #[doc(hidden)]
 pub use table::{Sampled, Table};
+pub use tool::ToolCertificate;
 #[doc(hidden)]
-pub use torque::torque_certificate;
+pub use torque::{rate_certificate, torque_certificate};

@@ -1,28 +1,20 @@
-//! Torque over all time: samples, and a proof of what happens between them.
+//! Torque and its rate over all time: samples, and a proof of what happens between them.
 
-use super::certificate::{TorqueBound, check};
+use super::certificate::{SampledBound, TorqueBound, check};
+use super::enclose::{Enclosed, Motion, enclose};
 use super::fourier::Fourier;
-use super::jets::{Jet, Norms};
+use super::jets::Norms;
 use crate::error::{Error, Result};
-use crate::robot::{JointTerm, Robot};
+use crate::robot::{Joint, JointTerm, Robot};
 
-/// What may be missing between samples, as a fraction of the effort limit.
+/// What may be missing between samples, as a fraction of the limit.
 const TARGET: f64 = 0.002;
+/// Step of the central difference of a rate, as a fraction of the period; its error is bounded, too.
+const STEP: f64 = 1e-5;
 
 /// The smooth part of the torque (rigid bodies, armature, viscous friction, offset) at one state:
 /// `(q, qd, qdd, tau)` with `tau` to be written.
 pub type TorqueFn<'a> = dyn Fn(&[f64], &[f64], &[f64], &mut [f64]) + 'a;
-
-/// Part of the period between two samples.
-#[derive(Clone, Copy)]
-struct Interval {
-    start: f64,
-    width: f64,
-    /// indices of the samples at its ends
-    ends: [usize; 2],
-    /// index of the segment it came from, whose bound of `τ̈` holds in it
-    segment: usize,
-}
 
 /// Bounds every joint's torque over all time, `torque` being the smooth part.
 ///
@@ -44,149 +36,31 @@ pub fn torque_certificate(
     torque: &TorqueFn,
 ) -> Result<Vec<TorqueBound>> {
     check(robot, trajectory)?;
-    let n = robot.dof();
-    let period = trajectory.period;
-    let segments = (8 * trajectory.harmonic_max() as usize)
-        .clamp(64, 1024)
-        .min(samples.max(1));
-    let width = period / segments as f64;
-
-    let mut tau: Vec<f64> = Vec::new();
-    let mut times: Vec<f64> = Vec::new();
-    let mut state = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-    let mut highest = vec![0.0f64; n];
-    let mut when = vec![0.0f64; n];
-    let mut take = |t: f64, tau: &mut Vec<f64>| -> Result<()> {
-        let [q, qd, qdd] = &mut state;
-        trajectory.evaluate(t, [q, qd, qdd]);
-        let at = tau.len();
-        tau.resize(at + n, 0.0);
-        torque(q, qd, qdd, &mut tau[at..]);
-        for (j, value) in tau[at..].iter_mut().enumerate() {
-            *value = value.abs();
-            if !value.is_finite() {
-                return Err(Error::Argument(format!(
-                    "the torque of joint {} is not finite at t = {t} s; check the inertial \
-                     parameters",
-                    robot.joints[j].name
-                )));
-            }
-            if *value > highest[j] {
-                (highest[j], when[j]) = (*value, t);
-            }
-        }
-        times.push(t);
-        Ok(())
+    let mut state = State::new(robot.dof());
+    let take = |t: f64, out: &mut [f64]| {
+        state.torque(trajectory, t, torque, out);
+        finite(robot, t, out)
     };
-
-    let mut curvature = Vec::with_capacity(segments * n);
-    let bounds = Derivatives::new(trajectory);
     let norms = Norms::new(robot);
-    let mut open = Vec::with_capacity(segments);
-    for segment in 0..segments {
-        let start = segment as f64 * width;
-        take(start, &mut tau)?;
-        curvature.extend(norms.torque_curvature(&bounds.on(trajectory, start, width)));
-        open.push(Interval {
-            start,
-            width,
-            ends: [segment, (segment + 1) % segments],
-            segment,
-        });
-    }
-    // the sup of what intervals already closed could hold
-    let mut settled = vec![0.0f64; n];
-    loop {
-        let best: Vec<f64> = (0..n)
-            .map(|j| {
-                (0..tau.len() / n)
-                    .map(|i| tau[i * n + j])
-                    .fold(0.0, f64::max)
-            })
-            .collect();
-        let scale = best.iter().copied().fold(0.0, f64::max);
-        let target: Vec<f64> = robot
-            .joints
-            .iter()
-            .map(|joint| {
-                let effort = joint.limits.effort;
-                TARGET
-                    * if effort.is_finite() && effort > 0.0 {
-                        effort
-                    } else {
-                        scale
-                    }
-            })
-            .collect();
-        let above = |interval: &Interval, j: usize| {
-            let [a, b] = interval.ends;
-            let sag = interval.width * interval.width / 8.0 * curvature[interval.segment * n + j];
-            tau[a * n + j].max(tau[b * n + j]) + sag
-        };
-        // by how many targets the worst joint's bound exceeds its largest sample
-        let mut ranked: Vec<(f64, Interval)> = open
-            .drain(..)
-            .map(|interval| {
-                let excess = (0..n)
-                    .map(|j| (above(&interval, j) - best[j]) / target[j])
-                    .map(|e| if e.is_nan() { 0.0 } else { e })
-                    .fold(f64::NEG_INFINITY, f64::max);
-                (excess, interval)
-            })
-            .collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.start.total_cmp(&b.1.start)));
-        let wanted = ranked
-            .iter()
-            .take_while(|(excess, _)| *excess > 1.0)
-            .count();
-        let halved = wanted.min(samples.saturating_sub(tau.len() / n));
-        for (_, interval) in &ranked[halved..] {
-            for (j, sup) in settled.iter_mut().enumerate() {
-                *sup = sup.max(above(interval, j));
-            }
-        }
-        if halved == 0 {
-            break;
-        }
-        for (_, interval) in &ranked[..halved] {
-            let half = 0.5 * interval.width;
-            let middle = tau.len() / n;
-            take(interval.start + half, &mut tau)?;
-            let [a, b] = interval.ends;
-            open.push(Interval {
-                width: half,
-                ends: [a, middle],
-                ..*interval
-            });
-            open.push(Interval {
-                start: interval.start + half,
-                width: half,
-                ends: [middle, b],
-                ..*interval
-            });
-        }
-    }
-
-    let taken = times.len();
-    Ok(robot
-        .joints
-        .iter()
-        .enumerate()
-        .map(|(j, joint)| {
+    let curvature = |motion: &Motion, start: f64, width: f64| {
+        let of = norms.torque_derivatives(&motion.on(start, width));
+        of.into_iter().map(|[second, _]| second).collect()
+    };
+    let limits: Vec<f64> = robot.joints.iter().map(|j| j.limits.effort).collect();
+    let found = enclose(trajectory, samples, take, curvature, &targets(&limits))?;
+    let each = robot.joints.iter().zip(found);
+    Ok(each
+        .map(|(joint, found)| {
             let coulomb = joint.terms[JointTerm::Coulomb as usize].abs();
-            let limit = joint
-                .limits
-                .effort
-                .is_finite()
-                .then_some(joint.limits.effort);
-            let value = highest[j] + coulomb;
+            let limit = Some(joint.limits.effort).filter(|l| l.is_finite());
+            let value = found.highest + coulomb;
             TorqueBound {
                 joint: joint.name.clone(),
-                max_on_grid: highest[j],
-                time: when[j],
-                between_grid_bound: (settled[j] - highest[j]).max(0.0),
+                max_on_grid: found.highest,
+                time: found.time,
+                between_grid_bound: found.between,
                 coulomb,
-                samples: taken,
+                samples: found.samples,
                 limit,
                 used: limit.map(|l| if value == 0.0 { 0.0 } else { value / l }),
                 margin: limit.map(|l| l - value),
@@ -195,49 +69,101 @@ pub fn torque_certificate(
         .collect())
 }
 
-/// Bounds of `|q⁽ᵏ⁾|` on intervals of time.
-struct Derivatives {
-    /// `Σ_h (hω)ᵏ A_h` of every joint, `k = 0 … 6` (without the constant)
-    sums: Vec<[f64; 7]>,
+/// Bounds the rate of every joint's smooth torque over all time, like [`torque_certificate`] with `sup |τ⃛|`.
+/// `None` for joints without such a limit. Coulomb friction, which jumps where a joint turns, is no part of it.
+///
+/// A rate is the central difference of two torques `δ` before and after, wrong by `(δ²/6) sup |τ⃛|` at most,
+/// which is added.
+///
+/// # Errors
+/// As [`torque_certificate`].
+pub fn rate_certificate(
+    robot: &Robot,
+    trajectory: &Fourier,
+    samples: usize,
+    torque: &TorqueFn,
+) -> Result<Vec<Option<SampledBound>>> {
+    check(robot, trajectory)?;
+    let limited = |j: &Joint| j.limits.effort_rate.is_finite();
+    if !robot.joints.iter().any(limited) {
+        return Ok(vec![None; robot.dof()]);
+    }
+    let step = STEP * trajectory.period;
+    let mut state = State::new(robot.dof());
+    let mut before = vec![0.0; robot.dof()];
+    let take = |t: f64, out: &mut [f64]| {
+        state.torque(trajectory, t - step, torque, &mut before);
+        state.torque(trajectory, t + step, torque, out);
+        let ends = out.iter_mut().zip(&before);
+        ends.for_each(|(after, before)| *after = (*after - before) / (2.0 * step));
+        finite(robot, t, out)
+    };
+    let norms = Norms::new(robot);
+    let mut third = vec![0.0_f64; robot.dof()];
+    let curvature = |motion: &Motion, start: f64, width: f64| -> Vec<f64> {
+        let of = norms.torque_derivatives(&motion.on(start, width));
+        let of: Vec<f64> = of.into_iter().map(|[_, third]| third).collect();
+        third.iter_mut().zip(&of).for_each(|(a, b)| *a = a.max(*b));
+        of
+    };
+    let limits: Vec<f64> = robot.joints.iter().map(|j| j.limits.effort_rate).collect();
+    let found = enclose(trajectory, samples, take, curvature, &targets(&limits))?;
+    let each = robot.joints.iter().zip(found).zip(third);
+    Ok(each
+        .map(|((joint, found), third)| {
+            let Enclosed {
+                highest,
+                time,
+                between,
+                samples,
+            } = found;
+            let limit = joint.limits.effort_rate;
+            limited(joint).then(|| SampledBound {
+                max_on_grid: highest,
+                time,
+                between_grid_bound: between + step * step / 6.0 * third,
+                samples,
+                limit,
+                used: highest / limit,
+                margin: limit - highest,
+            })
+        })
+        .collect())
 }
 
-impl Derivatives {
-    fn new(trajectory: &Fourier) -> Self {
-        let omega = trajectory.omega();
-        let sums = trajectory
-            .joints
-            .iter()
-            .map(|s| {
-                std::array::from_fn(|k| {
-                    s.amplitude_sum(&trajectory.harmonics, omega, k as u32) * (1.0 + 1e-9)
-                })
-            })
-            .collect();
-        Derivatives { sums }
+/// What may be missing: a fraction of the limits, of the largest value where there is none.
+fn targets(limits: &[f64]) -> impl Fn(&[f64]) -> Vec<f64> + '_ {
+    |best| {
+        let scale = best.iter().copied().fold(0.0, f64::max);
+        let each = limits.iter().map(|l| match l.is_finite() && *l > 0.0 {
+            true => TARGET * l,
+            false => TARGET * scale,
+        });
+        each.collect()
+    }
+}
+
+fn finite(robot: &Robot, t: f64, values: &[f64]) -> Result<()> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(j) => Err(Error::Argument(format!(
+            "the torque of joint {} is not finite at t = {t} s; check the inertial parameters",
+            robot.joints[j].name
+        ))),
+    }
+}
+
+/// Memory of one evaluation.
+struct State([Vec<f64>; 3]);
+
+impl State {
+    fn new(n: usize) -> Self {
+        State([vec![0.0; n], vec![0.0; n], vec![0.0; n]])
     }
 
-    /// `k = 0 … 4` on an interval, by Taylor about its centre `m`, half width `r`:
-    /// `|q⁽ᵏ⁾| ≤ |q⁽ᵏ⁾(m)| + r |q⁽ᵏ⁺¹⁾(m)| + ½ r² sup |q⁽ᵏ⁺²⁾|`.
-    fn on(&self, trajectory: &Fourier, start: f64, width: f64) -> Vec<Jet> {
-        let n = trajectory.dof();
-        let (r, mut d) = (0.5 * width, vec![0.0; 6 * n]);
-        let mut rows = d.chunks_exact_mut(n);
-        let mut row = || rows.next().unwrap_or_default();
-        trajectory.evaluate(start + r, [row(), row(), row(), row(), row(), row()]);
-        (0..n)
-            .map(|j| {
-                let sums = &self.sums[j];
-                std::array::from_fn(|k| {
-                    let at = |order: usize| d[order * n + j].abs();
-                    let local = at(k) + r * at(k + 1) + 0.5 * r * r * sums[k + 2];
-                    let shift = if k == 0 {
-                        trajectory.joints[j].constant.abs()
-                    } else {
-                        0.0
-                    };
-                    local.min(sums[k] + shift) + 1e-12 * (sums[k] + shift)
-                })
-            })
-            .collect()
+    fn torque(&mut self, trajectory: &Fourier, t: f64, torque: &TorqueFn, out: &mut [f64]) {
+        let [q, qd, qdd] = &mut self.0;
+        trajectory.evaluate(t, [q, qd, qdd]);
+        torque(q, qd, qdd, out);
     }
 }

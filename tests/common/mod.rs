@@ -49,6 +49,7 @@ pub fn joint(name: &str, motion: Motion) -> Joint {
             acceleration: 10.0,
             jerk: 500.0,
             effort: 200.0,
+            ..Limits::default()
         },
         torque_noise: Some(0.1),
         position_resolution: None,
@@ -112,6 +113,7 @@ pub fn robot(seed: u64, n: usize, mimic: bool) -> Robot {
         path: None,
         hash: String::new(),
         geometry: Default::default(),
+        tool: None,
     }
 }
 

@@ -38,7 +38,7 @@ import pinocchio as pin
 
 HERE = pathlib.Path(__file__).resolve().parent
 BUNDLED = HERE.parent.parent / "src/robot/bundled"
-ROBOTS = ["panda", "ur10", "ur10e", "ur5e", "iiwa14", "puma560", "scara", "planar2"]
+ROBOTS = ["panda", "ur10", "ur10e", "ur5e", "iiwa14", "puma560", "scara", "planar2", "fr3"]
 
 # Pinocchio: m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz
 ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]

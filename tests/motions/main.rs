@@ -5,6 +5,7 @@ mod common;
 
 mod clear;
 mod conic;
+mod controller_limits;
 mod design;
 mod moves;
 mod trajectory;

@@ -37,6 +37,7 @@ fn robot(bodies: Vec<Body>, joints: Vec<Joint>) -> Robot {
         path: None,
         hash: String::new(),
         geometry: Default::default(),
+        tool: None,
     }
 }
 
@@ -248,7 +249,7 @@ proptest! {
                 excite::trajectory::extrema(f.period, &f.harmonics, s, k as u32).magnitude_bound()
             })
         }).collect();
-        let bound = Norms::new(&robot).torque_curvature(&jets);
+        let bounds = Norms::new(&robot).torque_derivatives(&jets);
         let h = 1e-3 * f.period;
         let at = |t: f64| {
             let mut s = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
@@ -260,12 +261,15 @@ proptest! {
         };
         for i in 0..1000 {
             let t = i as f64 * h;
-            let (a, b, c) = (at(t - h), at(t), at(t + h));
+            let (a, b, c, d) = (at(t - h), at(t), at(t + h), at(t + 2.0 * h));
             for j in 0..n {
+                let third = (d[j] - 3.0 * c[j] + 3.0 * b[j] - a[j]) / (h * h * h);
+                let rounding = 1e-10 * (1.0 + b[j].abs()) / (h * h * h);
+                prop_assert!(third.abs() <= bounds[j][1] + rounding, "{} > {}", third, bounds[j][1]);
                 // a second difference is a mean of the second derivative
                 let second = (a[j] - 2.0 * b[j] + c[j]) / (h * h);
                 let rounding = 1e-11 * (1.0 + b[j].abs()) / (h * h);
-                prop_assert!(second.abs() <= bound[j] + rounding, "{} > {}", second, bound[j]);
+                prop_assert!(second.abs() <= bounds[j][0] + rounding, "{} > {}", second, bounds[j][0]);
             }
         }
     }
@@ -333,6 +337,7 @@ fn arm() -> Robot {
             acceleration: 15.0,
             jerk: 7500.0,
             effort,
+            ..Limits::default()
         };
         joints.push(joint(&format!("joint{}", i + 1), Motion::Revolute, limits));
     }

@@ -103,6 +103,7 @@ fn five_bar_setup() -> Setup {
             acceleration: 60.0,
             jerk: 3000.0,
             effort: 12.0,
+            ..Limits::default()
         };
         motor.torque_noise = Some(0.02);
         motor.terms = [0.0, 0.05, 0.0, 0.0];

@@ -43,8 +43,8 @@ struct Reference {
     invariant: Option<f64>,
 }
 
-const NAMES: [&str; 9] = [
-    "panda", "ur10", "ur10e", "ur5e", "iiwa14", "puma560", "scara", "planar2", "tree",
+const NAMES: [&str; 10] = [
+    "panda", "ur10", "ur10e", "ur5e", "iiwa14", "puma560", "scara", "planar2", "tree", "fr3",
 ];
 
 /// A robot and the figures for it; its coordinates are in the order of the file.

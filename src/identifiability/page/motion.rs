@@ -8,9 +8,12 @@ use crate::report::plot::{self, Axis, Bar, Colour, Marker, Panel, Series, Shape}
 use crate::robot::{Motion, Robot};
 use crate::trajectory::RATE;
 use crate::trajectory::Space;
+use crate::trajectory::ToolCertificate;
 use crate::trajectory::certificate::{Kind, Peak};
 use maud::{Markup, html};
 
+/// Share of a limit beyond which it does not matter how far.
+const FAR: f64 = 10.0;
 /// Limits that do not hold which are listed at once.
 const LISTED: usize = 8;
 
@@ -25,6 +28,10 @@ fn heading(kind: Kind, robot: &Robot) -> &'static str {
         Kind::Torque if robot.joints.iter().all(|j| slides(j.motion)) => "Force",
         Kind::Torque if robot.joints.iter().any(|j| slides(j.motion)) => "Torque or force",
         Kind::Torque => "Torque",
+        Kind::VelocityByPosition => "Velocity by position",
+        Kind::TorqueRate => "Rate of torque",
+        Kind::ToolSpeed => "Speed of the tool point",
+        Kind::ToolAcceleration => "Acceleration of the tool point",
         Kind::Pose => "Margin",
     }
 }
@@ -201,7 +208,16 @@ fn numbers(robot: &Robot, e: &Excitation) -> Markup {
                 html! { (c.joint) br; small { (angle) ", " (force) } },
                 at(c.position.min.value, c.position.min.time),
                 at(c.position.max.value, c.position.max.time),
-                peak(&c.velocity),
+                match &c.velocity_by_position {
+                    Some(p) => html! {
+                        (peak(&c.velocity)) br;
+                        small {
+                            (significant(p.velocity, 4)) " where " (significant(p.limit, 4)) " is allowed, at "
+                            (significant(p.position, 4)) ", t = " (significant(p.time, 4)) "\u{a0}s"
+                        }
+                    },
+                    None => peak(&c.velocity),
+                },
                 peak(&c.acceleration),
                 peak(&c.jerk),
                 match &c.torque {
@@ -235,13 +251,20 @@ fn numbers(robot: &Robot, e: &Excitation) -> Markup {
 
 /// How much of each limit is used.
 pub(super) fn usage(robot: &Robot, e: &Excitation) -> Section {
-    const KINDS: [Kind; 5] = [
+    let mut kinds = vec![
         Kind::Position,
         Kind::Velocity,
         Kind::Acceleration,
         Kind::Jerk,
         Kind::Torque,
     ];
+    let joints = &e.certificate.joints;
+    if joints.iter().any(|c| c.velocity_by_position.is_some()) {
+        kinds.push(Kind::VelocityByPosition);
+    }
+    if joints.iter().any(|c| c.torque_rate.is_some()) {
+        kinds.push(Kind::TorqueRate);
+    }
     let cells: Vec<Vec<Option<Bar>>> = e
         .certificate
         .joints
@@ -266,20 +289,34 @@ pub(super) fn usage(robot: &Robot, e: &Excitation) -> Section {
                 more: 0.0,
                 alarm: !c.position.satisfied(),
             });
-            vec![
-                position,
-                peak(&c.velocity),
-                peak(&c.acceleration),
-                peak(&c.jerk),
-                torque,
-            ]
+            let by_position = c.velocity_by_position.map(|p| Bar {
+                value: p.used.min(FAR),
+                more: 0.0,
+                alarm: !p.satisfied(),
+            });
+            let rate = c.torque_rate.as_ref().map(|t| Bar {
+                value: t.used,
+                more: t.between_grid_bound / t.limit,
+                alarm: !t.satisfied(),
+            });
+            let bar = |kind: &Kind| match kind {
+                Kind::Position => position,
+                Kind::Velocity => peak(&c.velocity),
+                Kind::Acceleration => peak(&c.acceleration),
+                Kind::Jerk => peak(&c.jerk),
+                Kind::VelocityByPosition => by_position,
+                Kind::TorqueRate => rate,
+                _ => torque,
+            };
+            kinds.iter().map(bar).collect()
         })
         .collect();
+    let headings: Vec<String> = kinds.iter().map(|k| heading(*k, robot).into()).collect();
     let svg = plot::bars(
         "How much of each limit every joint uses",
         plot::Figure::WIDTH,
         &robot.joint_names(),
-        &KINDS.map(|k| heading(k, robot).to_string()),
+        &headings,
         &cells,
     );
     let caption = html! {
@@ -288,7 +325,44 @@ pub(super) fn usage(robot: &Robot, e: &Excitation) -> Section {
             (Colour::VERMILLION, Shape::Line, "beyond the limit or not proven"),
         ]))
         "The line is the whole limit. Position counts from the middle of the range. The pale end of \
-         a torque bar is what may be missing between samples."
+         a bar of torque or of its rate is what may be missing between samples."
+        @if joints.iter().any(|c| c.velocity_by_position.is_some()) {
+            " Velocity by position is the share of the velocity that the controller allows where the joint is, at \
+             the worst instant; it is proven for all time."
+        }
     };
-    Section::new("How much of each limit is used", html::figure(svg, caption))
+    let body = html! {
+        (html::figure(svg, caption))
+        @if let Some(t) = &e.certificate.tool { (tool_point(t)) }
+    };
+    Section::new("How much of each limit is used", body)
+}
+
+/// Speed and acceleration of the tool point against their limits.
+fn tool_point(t: &ToolCertificate) -> Markup {
+    let both = [
+        ("speed", &t.speed, "m/s"),
+        ("acceleration", &t.acceleration, "m/s²"),
+    ];
+    let rows: Vec<Vec<Markup>> = both
+        .into_iter()
+        .filter_map(|(what, bound, unit)| {
+            let b = bound.as_ref()?;
+            Some(vec![
+                html! { (t.frame) " " (what) br; small { (unit) } },
+                html! { (significant(b.max_on_grid, 4)) br; small { "t = " (significant(b.time, 4)) "\u{a0}s" } },
+                html! { (significant(b.between_grid_bound, 2)) },
+                html! { (significant(b.limit, 4)) },
+                html! { (percent(b.used)) },
+            ])
+        })
+        .collect();
+    let head = [
+        "tool point",
+        "largest",
+        "between samples +",
+        "limit",
+        "used",
+    ];
+    html::table(&head, &[], &rows)
 }

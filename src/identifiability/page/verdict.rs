@@ -8,6 +8,7 @@ use crate::plant::PairClearance;
 use crate::report::format::{count, percent, significant, unit_of, with_unit};
 use crate::robot::{Motion, Robot};
 use crate::trajectory::certificate::{JointCertificate, Kind, Peak};
+use crate::trajectory::{PositionPeak, SampledBound};
 
 /// Condition number from which a trajectory does not excite every base parameter.
 const UNEXCITED: f64 = 1e7;
@@ -202,6 +203,9 @@ pub(in crate::identifiability) fn violations(robot: &Robot, e: &Excitation) -> V
                 all.push(magnitude(&c.joint, kind, joint.motion, &peak));
             }
         }
+        if let Some(p) = c.velocity_by_position.as_ref().filter(|p| !p.satisfied()) {
+            all.push(by_position(&c.joint, joint.motion, p));
+        }
         if let Some(t) = c.torque.as_ref().filter(|t| !t.satisfied()) {
             let peak = Peak {
                 value: t.max_on_grid + t.coulomb,
@@ -212,6 +216,20 @@ pub(in crate::identifiability) fn violations(robot: &Robot, e: &Excitation) -> V
                 margin: t.margin,
             };
             all.push(magnitude(&c.joint, Kind::Torque, joint.motion, &peak));
+        }
+        if let Some(t) = c.torque_rate.as_ref().filter(|t| !t.satisfied()) {
+            all.push(sampled(&c.joint, Kind::TorqueRate, joint.motion, t));
+        }
+    }
+    if let Some(tool) = &e.certificate.tool {
+        let both = [
+            (Kind::ToolSpeed, &tool.speed),
+            (Kind::ToolAcceleration, &tool.acceleration),
+        ];
+        for (kind, bound) in both {
+            if let Some(b) = bound.as_ref().filter(|b| !b.satisfied()) {
+                all.push(sampled(&tool.frame, kind, Motion::Prismatic, b));
+            }
         }
     }
     if let Some(p) = &e.platform {
@@ -282,6 +300,44 @@ fn magnitude(joint: &str, kind: Kind, motion: Motion, peak: &Peak) -> (f64, Stri
         )
     };
     (peak.used.unwrap_or(f64::INFINITY), text)
+}
+
+/// A sampled magnitude beyond its limit.
+fn sampled(name: &str, kind: Kind, motion: Motion, b: &SampledBound) -> (f64, String) {
+    let peak = Peak {
+        value: b.max_on_grid,
+        time: b.time,
+        bound: b.bound(),
+        limit: Some(b.limit),
+        used: Some(b.used),
+        margin: Some(b.margin),
+    };
+    magnitude(name, kind, motion, &peak)
+}
+
+/// A velocity beyond what the position leaves of it.
+fn by_position(joint: &str, motion: Motion, p: &PositionPeak) -> (f64, String) {
+    let rate = unit_of(Kind::Velocity, motion);
+    let place = format!(
+        "at {} (t = {})",
+        with_unit(p.position, 4, unit_of(Kind::Position, motion)),
+        with_unit(p.time, 4, "s")
+    );
+    let velocity = with_unit(p.velocity, 4, rate);
+    let text = if p.used.is_infinite() {
+        format!(
+            "{joint} still moves outwards {place}, at {velocity}, where no velocity is allowed any more"
+        )
+    } else if p.used > 1.0 {
+        format!(
+            "{joint} velocity is {velocity} {place}, {} over the {} that its position allows",
+            percent(p.used - 1.0),
+            with_unit(p.limit, 4, rate)
+        )
+    } else {
+        format!("{joint} velocity is not proven to stay within what its position allows")
+    };
+    (p.used, text)
 }
 
 /// A position beyond one or both of its limits.

@@ -101,6 +101,25 @@ macro_rules! mechanism_file {
 }
 pub(super) use mechanism_file;
 
+/// Limits that are kept for serial and tree robots only are no limits of a parallel one.
+fn refuse(source: Text, entry: &JointEntry, what: &str) -> Result<()> {
+    let by_position = entry.velocity_by_position.as_ref().map(|e| e.span());
+    let rate = entry.effort_rate.as_ref().map(|e| e.span());
+    for (key, span) in [("velocity_by_position", by_position), ("effort_rate", rate)] {
+        if let Some(span) = span {
+            return Err(source.error(
+                span.start,
+                what,
+                format!(
+                    "{key} is kept for serial and tree robots only; remove it, and state a constant limit \
+                     that it implies"
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// Values of one entry on top of those that a joint has already.
 fn overlay(
     source: Text,
@@ -109,6 +128,7 @@ fn overlay(
     joint: &mut Joint,
     warnings: &mut Vec<Warning>,
 ) -> Result<()> {
+    refuse(source, entry, what)?;
     let stated = stated_limits(source, entry, what)?;
     let limits = &mut joint.limits;
     limits.position = stated.position.unwrap_or(limits.position);

@@ -6,7 +6,7 @@ mod tree;
 
 use super::body::positive;
 use super::common::mechanism_file;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::mechanism::Mechanism;
 use crate::mechanism::loops::Loops;
 use crate::mechanism::loops::yaml;
@@ -92,6 +92,14 @@ pub(super) fn read(source: Text, folder: &Path) -> Result<Mechanism> {
     let mut robot = tree(&urdf, &mut lock, &listed_loops)?;
     robot.name = head.name();
     robot.gravity = head.gravity()?;
+    for joint in &mut robot.joints {
+        if joint.limits.velocity_by_position.take().is_some() {
+            let message = "its <position_based_velocity_limits> are kept for serial and tree robots only and \
+                           not looked at here; state a constant `velocity` that they imply";
+            let warning = Warning::new(WarningKind::EntryIgnored, joint.name.clone(), message);
+            robot.warnings.push(warning);
+        }
+    }
     let names = Names {
         urdf: &urdf,
         robot: &robot,

@@ -3,7 +3,7 @@
 use super::Text;
 use crate::error::{Result, Warning, WarningKind};
 use crate::robot::urdf::StatedLimits;
-use crate::robot::{Joint, JointTerm};
+use crate::robot::{Joint, JointTerm, VelocityByPosition};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -19,6 +19,8 @@ pub(crate) struct JointEntry {
     acceleration: Option<Spanned<f64>>,
     jerk: Option<Spanned<f64>>,
     effort: Option<Spanned<f64>>,
+    pub(crate) effort_rate: Option<Spanned<f64>>,
+    pub(crate) velocity_by_position: Option<Spanned<ByPositionEntry>>,
     torque_noise: Option<Spanned<f64>>,
     position_resolution: Option<Spanned<f64>>,
     gear_ratio: Option<Spanned<f64>>,
@@ -31,6 +33,17 @@ pub(crate) struct JointEntry {
     offset: Option<Spanned<f64>>,
     #[serde(default)]
     identify: Vec<Spanned<String>>,
+}
+
+/// `velocity_by_position`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ByPositionEntry {
+    deceleration: f64,
+    #[serde(default)]
+    offset: f64,
+    // a vector, because an array would swallow further elements in silence
+    position: Option<Vec<f64>>,
 }
 
 /// Smallest and largest limit: what lies outside is a slip, and powers of it would leave the range
@@ -83,11 +96,46 @@ pub(crate) fn stated_limits(source: Text, entry: &JointEntry, what: &str) -> Res
         position,
         velocity: positive(source, &entry.velocity, "velocity", what)?,
         effort: positive(source, &entry.effort, "effort", what)?,
+        by_position: entry.velocity_by_position.is_some(),
     })
 }
 
+/// A velocity by position, at the ends of the joint's range where it states none.
+fn by_position(
+    source: Text,
+    entry: &Spanned<ByPositionEntry>,
+    what: &str,
+    range: [f64; 2],
+) -> Result<VelocityByPosition> {
+    let (at, e) = (entry.span().start, entry.get_ref());
+    let error =
+        |message: String| source.error(at, what, format!("velocity_by_position: {message}"));
+    let (d, o) = (e.deceleration, e.offset);
+    if !(d > 0.0 && in_range(d) && o >= 0.0 && in_range(o)) {
+        return Err(error(format!(
+            "deceleration = {d} must be positive and offset = {o} not negative, in SI units"
+        )));
+    }
+    let position = match e.position.as_deref() {
+        None => range,
+        Some(&[low, high]) if low < high => [low, high],
+        Some(_) => return Err(error("position must be two numbers [lower, upper]".into())),
+    };
+    let limit = VelocityByPosition {
+        deceleration: d,
+        offset: o,
+        position,
+    };
+    match limit.flaw() {
+        None => Ok(limit),
+        Some(flaw) => Err(error(format!(
+            "it {flaw}; state other figures, or `position` in it"
+        ))),
+    }
+}
+
 /// A positive limit; infinite means none.
-fn positive(
+pub(super) fn positive(
     source: Text,
     value: &Option<Spanned<f64>>,
     key: &str,
@@ -143,6 +191,13 @@ pub(crate) fn joint_values(
     }
     if let Some(j) = positive(source, &entry.jerk, "jerk", what)? {
         joint.limits.jerk = j;
+    }
+    if let Some(rate) = positive(source, &entry.effort_rate, "effort_rate", what)? {
+        joint.limits.effort_rate = rate;
+    }
+    if let Some(entry) = &entry.velocity_by_position {
+        let limit = by_position(source, entry, what, joint.limits.position)?;
+        joint.limits.velocity_by_position = Some(limit);
     }
     joint.torque_noise = positive_finite(source, &entry.torque_noise, "torque_noise", what)?;
     joint.position_resolution = positive_finite(

@@ -1,9 +1,16 @@
 //! The commented `robot.toml` of `excite new`.
 
-use crate::robot::{JointTerm, Motion, Prior, Robot};
+use crate::robot::{JointTerm, Motion, Prior, Robot, VelocityByPosition};
 use crate::solid::Shape;
 use nalgebra::{Rotation3, Vector3};
 use std::fmt::Write as _;
+
+/// What stands where a joint has none.
+const EXAMPLE: VelocityByPosition = VelocityByPosition {
+    deceleration: 6.0,
+    offset: 0.3,
+    position: [-2.5, 2.5],
+};
 
 /// A `robot.toml` with all joints and their present values; what has none is commented out.
 pub(super) fn template(robot: &Robot, urdf: &str) -> String {
@@ -64,6 +71,12 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
         key("jerk", finite(l.jerk), 1000.0, &format!("{angle}/s^3"));
         key("effort", finite(l.effort), 50.0, torque);
         key(
+            "effort_rate",
+            finite(l.effort_rate),
+            1000.0,
+            &format!("{torque}/s"),
+        );
+        key(
             "torque_noise",
             joint.torque_noise,
             0.1,
@@ -88,6 +101,22 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
             100.0,
             "W: mean mechanical power that it bears for ever",
         );
+        let (hash, by_position) = match l.velocity_by_position {
+            Some(v) => ("", v),
+            None => ("# ", EXAMPLE),
+        };
+        let _ = writeln!(
+            out,
+            "{hash}velocity_by_position = {{ deceleration = {:?}, offset = {:?}, position = {:?} }}     \
+             # velocity is at most sqrt(2 deceleration (end - position)) - offset towards an end",
+            by_position.deceleration, by_position.offset, by_position.position
+        );
+        let mut key = |key: &str, value: Option<f64>, example: f64, comment: &str| {
+            let _ = match value {
+                Some(v) => writeln!(out, "{key} = {v:?}     # {comment}"),
+                None => writeln!(out, "# {key} = {example:?}     # {comment}"),
+            };
+        };
         let [armature, viscous, coulomb, offset] = joint.terms;
         key(
             "armature",
@@ -115,8 +144,42 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
             identify.join(", ")
         );
     }
+    tool(robot, &mut out);
     surroundings(robot, &mut out);
     out
+}
+
+/// `[tool]`, its frame the link that carries it.
+fn tool(robot: &Robot, out: &mut String) {
+    let quoted = |s: &str| toml::Value::String(s.to_string()).to_string();
+    let Some(tool) = &robot.tool else {
+        let last = robot.bodies.last().map_or("tip", |b| b.name.as_str());
+        let _ = write!(
+            out,
+            "\n# Limits of the tool point.\n# [tool]\n# frame = {}     # a link\n# point = [0.0, 0.0, 0.1]     # m, in \
+             its axes\n# speed = 1.0     # m/s\n# acceleration = 10.0     # m/s^2\n",
+            quoted(last)
+        );
+        return;
+    };
+    let p = tool.point;
+    let _ = write!(
+        out,
+        "\n# Limits of the tool point.\n[tool]\nframe = {}\npoint = [{:?}, {:?}, {:?}]     # m, in its axes\n",
+        quoted(&robot.bodies[tool.body].name),
+        p.x,
+        p.y,
+        p.z
+    );
+    for (key, limit, unit) in [
+        ("speed", tool.speed, "m/s"),
+        ("acceleration", tool.acceleration, "m/s^2"),
+    ] {
+        let _ = match limit.is_finite() {
+            true => writeln!(out, "{key} = {limit:?}     # {unit}"),
+            false => writeln!(out, "# {key} = 10.0     # {unit}: unlimited"),
+        };
+    }
 }
 
 /// `[collision]` and the volumes of the links, in link frames, a tenth of a millimetre larger than fitted.

@@ -1,8 +1,8 @@
 //! Limits of a coordinate from `<limit>`, what `robot.toml` states instead, and its mimics.
 
-use super::{Kind, StatedLimits, UrdfJoint};
+use super::{ByPosition, Kind, StatedLimits, UrdfJoint};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::robot::Limits;
+use crate::robot::{Limits, VelocityByPosition};
 use std::path::Path;
 
 /// A position (rad or m) beyond this is the way in which a file says that there is no limit.
@@ -100,6 +100,15 @@ pub(super) fn of_joint(
         Ok(None) => missing.push("effort"),
         Err(message) => return error(message),
     }
+    if let (Some(l), false) = (joint.by_position, stated.by_position) {
+        match by_position(&l, limits.position) {
+            Ok(l) => limits.velocity_by_position = Some(l),
+            Err(message) => {
+                let place = format!("line {}: {what}", l.line);
+                return Err(Error::file(file, place, message));
+            }
+        }
+    }
     if !missing.is_empty() {
         warnings.push(Warning::new(
             WarningKind::LimitsMissing,
@@ -114,6 +123,35 @@ pub(super) fn of_joint(
     Ok(limits)
 }
 
+/// `<position_based_velocity_limits>` of a joint with these limits of position; what is wrong with it.
+fn by_position(
+    written: &ByPosition,
+    position: [f64; 2],
+) -> std::result::Result<VelocityByPosition, String> {
+    let remedy = "correct it or state `velocity_by_position` in robot.toml";
+    let (deceleration, offset) = match (written.deceleration, written.offset) {
+        (Some(d), Some(o)) if d > 0.0 && o >= 0.0 => (d, o),
+        (d, o) => {
+            let show = |x: Option<f64>| x.map_or("missing".into(), |x| format!("{x}"));
+            return Err(format!(
+                "<position_based_velocity_limits> needs deceleration_limit > 0 ({}) and velocity_offset not \
+                 negative ({}); {remedy}",
+                show(d),
+                show(o)
+            ));
+        }
+    };
+    let limit = VelocityByPosition {
+        deceleration,
+        offset,
+        position,
+    };
+    match limit.flaw() {
+        None => Ok(limit),
+        Some(flaw) => Err(format!("<position_based_velocity_limits> {flaw}; {remedy}")),
+    }
+}
+
 /// Narrows the limits of a coordinate to what a body that follows it as `q = ratio·q_c + offset`
 /// permits, except those that `robot.toml` states. Position limits of the follower that leave no
 /// room are reported and not applied.
@@ -125,6 +163,16 @@ pub(super) fn narrow(
     (ratio, offset): (f64, f64),
     warnings: &mut Vec<Warning>,
 ) {
+    if follower.by_position.is_some() {
+        warnings.push(Warning::new(
+            WarningKind::LimitsContradict,
+            format!("joint `{}`", follower.name),
+            format!(
+                "its <position_based_velocity_limits> are not applied, because it mimics `{leader}`; state \
+                 `velocity_by_position` for `{leader}` in robot.toml"
+            ),
+        ));
+    }
     let Some(limit) = follower.limit else { return };
     let velocity = limit.velocity.filter(|v| *v > 0.0);
     if let (Some(velocity), None) = (velocity, stated.velocity) {

@@ -1,7 +1,7 @@
 //! XML to links and joints.
 
 use super::geometry::forms;
-use super::{Kind, Limit, Link, Mimic, Urdf, UrdfJoint};
+use super::{ByPosition, Kind, Limit, Link, Mimic, Urdf, UrdfJoint};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Inertia, Placement, meant};
 use nalgebra::{Matrix3, Vector3};
@@ -19,10 +19,24 @@ const EIGENVALUE_TOLERANCE: f64 = 1e-6;
 const LARGEST: [f64; 3] = [1e7, 1e6, 1e8];
 
 /// Elements whose attributes are read.
-const READ: [&str; 12] = [
-    "robot", "link", "joint", "parent", "child", "origin", "axis", "limit", "mimic", "dynamics",
-    "mass", "inertia",
+const READ: [&str; 13] = [
+    "robot",
+    "link",
+    "joint",
+    "parent",
+    "child",
+    "origin",
+    "axis",
+    "limit",
+    BY_POSITION,
+    "mimic",
+    "dynamics",
+    "mass",
+    "inertia",
 ];
+
+/// Franka's extension of `<joint>`: velocity limits that depend on the position.
+const BY_POSITION: &str = "position_based_velocity_limits";
 
 /// Name and text that errors refer to.
 struct Source<'a> {
@@ -534,6 +548,14 @@ fn joint(
         }),
         None => None,
     };
+    let by_position = match child(node, BY_POSITION, what, warnings) {
+        Some(l) => Some(ByPosition {
+            line: source.line(l),
+            deceleration: source.number(l, "deceleration_limit", what)?,
+            offset: source.number(l, "velocity_offset", what)?,
+        }),
+        None => None,
+    };
     let mimic = match child(node, "mimic", what, warnings) {
         Some(m) => Some(Mimic {
             line: source.line(m),
@@ -579,6 +601,7 @@ fn joint(
             position,
         },
         limit,
+        by_position,
         mimic,
         damping,
         friction,

@@ -111,6 +111,7 @@ pub(super) fn build(urdf: &Urdf, options: &Options) -> Result<Robot> {
         path: None,
         hash: String::new(),
         geometry,
+        tool: None,
     })
 }
 
