@@ -7,6 +7,7 @@
 //! | [`method`] | robot, regressor, base parameters, design: the equations |
 //! | [`parallel`] | parallel robots |
 //! | [`identification`] | from a log to a model |
+//! | [`calibration`] | the geometry of a robot, from a camera, a tracker or a ball in sockets |
 //! | [`load`] | mass, centre of mass and inertia of a load |
 //! | [`collisions`] | what a motion must not touch, how it keeps clear, and how that is proven |
 //! | [`moves`] | the way to the start of a motion and back; a motion at several speeds |
@@ -26,6 +27,7 @@ macro_rules! documents {
     ($($name:ident $file:literal)*) => {
         $(
             #[doc = "[benchmarks.md]: crate::documentation::benchmarks"]
+            #[doc = "[calibration.md]: crate::documentation::calibration"]
             #[doc = "[collisions.md]: crate::documentation::collisions"]
             #[doc = "[compare.md]: crate::documentation::compare"]
             #[doc = "[design.md]: crate::documentation::design"]
@@ -53,6 +55,7 @@ macro_rules! documents {
 
 documents! {
     benchmarks "benchmarks"
+    calibration "calibration"
     collisions "collisions"
     compare "compare"
     design "design"

@@ -43,6 +43,7 @@
 //! | identify | [`identify`] | parameters with their uncertainty, validated on other records |
 //! | export | [`export`] | identified and improved robots as URDF, MuJoCo XML, `robot.toml` |
 //! | load | [`load`] | mass, centre of mass and inertia of what the robot carries |
+//! | calibrate | [`calibrate`] | the geometry of a robot, from what was seen or touched |
 //! | diagnose | [`diagnose`] | which effect the model lacks, and how far the gap shrinks with it |
 //! | documents | [`documentation`] | method, notation, files: the folder `docs/` |
 //!
@@ -64,6 +65,7 @@
 // change at any time.
 
 pub mod base;
+pub mod calibrate;
 #[doc(hidden)]
 pub mod collision;
 #[doc(hidden)]

@@ -1,6 +1,7 @@
 //! The command line. Exit status: 0 done, 1 could not do it (the reason on standard error), 2
 //! unusable arguments. Nothing but results goes to standard output.
 
+mod calibrate;
 mod design;
 mod diagnose;
 mod export;
@@ -9,6 +10,7 @@ mod identify;
 mod load;
 mod moves;
 mod new;
+mod poses;
 mod rehearse;
 mod robots;
 mod simulate;
@@ -48,6 +50,8 @@ enum Command {
     Simulate(simulate::Args),
     Export(export::Args),
     Load(load::Args),
+    Poses(poses::Args),
+    Calibrate(calibrate::Args),
     Robots(robots::Args),
     New(new::Args),
 }
@@ -66,6 +70,8 @@ pub fn main() -> ExitCode {
         Command::Simulate(a) => simulate::run(a),
         Command::Export(a) => export::run(a),
         Command::Load(a) => load::run(a),
+        Command::Poses(a) => poses::run(a),
+        Command::Calibrate(a) => calibrate::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
     };

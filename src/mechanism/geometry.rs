@@ -12,6 +12,7 @@
 //! q = F(x)     q̇ = D ẋ     q̈ = D ẍ + F_xx[ẋ, ẋ]
 //! ```
 
+use super::dimensions::Dimensions;
 use super::scalar::{Dual, Pack, Scalar, Taylor};
 use crate::dynamics::Samples;
 #[cfg(all(target_arch = "x86_64", feature = "wide"))]
@@ -83,6 +84,12 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn cones(&self, _x: &[f64]) -> Vec<Cone> {
         Vec::new()
     }
+
+    /// Its dimensions, where they can be calibrated.
+    #[doc(hidden)]
+    fn dimensions(&self) -> Option<Dimensions> {
+        None
+    }
 }
 
 /// Kinematics of batches, with their derivatives; object-safe. All arrays are sample-fastest:
@@ -117,6 +124,12 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
 
     /// As [`Kinematics::cones`].
     fn cones(&self, x: &[f64]) -> Vec<Cone>;
+
+    /// As [`Kinematics::dimensions`].
+    #[doc(hidden)]
+    fn dimensions(&self) -> Option<Dimensions> {
+        None
+    }
 
     /// Taylor coefficients of all tree coordinates over a stretch of time, from enclosures of those
     /// of the task coordinates; `None` where the kinematics has no closed form.
@@ -465,5 +478,8 @@ impl<K: Kinematics, const M: usize> Geometry for ClosedForm<K, M> {
     }
     fn cones(&self, x: &[f64]) -> Vec<Cone> {
         self.0.cones(x)
+    }
+    fn dimensions(&self) -> Option<Dimensions> {
+        self.0.dimensions()
     }
 }

@@ -18,6 +18,7 @@
 //!
 //! Khalil & Guégan, IEEE Transactions on Robotics 20(4), 2004, give the same model in closed form.
 
+use super::dimensions::{Dimensions, LegChain};
 use super::geometry::{ClosedForm, Cone, Coordinates, Kinematics, Segment};
 use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
@@ -304,6 +305,15 @@ impl Kinematics for Kinematic {
             });
         }
         all
+    }
+
+    fn dimensions(&self) -> Option<Dimensions> {
+        let leg = |l: &Leg| LegChain {
+            base: l.base,
+            platform: l.platform,
+            zero: l.zero,
+        };
+        Some(Dimensions::Legs(self.legs.iter().map(leg).collect()))
     }
 
     fn cones(&self, x: &[f64]) -> Vec<Cone> {

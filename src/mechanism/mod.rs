@@ -25,6 +25,7 @@ pub mod bundled;
 mod certificate;
 #[doc(hidden)]
 pub mod delta;
+pub(crate) mod dimensions;
 pub(crate) mod file;
 pub(crate) mod follow;
 mod forward;

@@ -17,6 +17,7 @@
 //! (frames in their joints at the arm, `z` along the rod). The platform keeps its tilt because the
 //! rods are parallel: those conditions are the [constraint block](Kinematics::constraint_block).
 
+use super::dimensions::{ArmChain, Dimensions};
 use super::geometry::{Coordinates, Kinematics, Segment};
 use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
@@ -203,6 +204,20 @@ impl Kinematics for Parallelograms {
             block[(i, 2 + chain.hinge.min(spins - 1))] = m.z;
         }
         Some(block)
+    }
+
+    fn dimensions(&self) -> Option<Dimensions> {
+        let chain = |c: &Chain| ArmChain {
+            motor: c.motor,
+            rotation: c.rotation,
+            zero: c.zero,
+            arm: c.arm_length,
+            rod: c.rod_length,
+            attachment: c.attachment,
+            hinge: c.hinge,
+        };
+        let chains = self.chains.iter().map(chain).collect();
+        Some(Dimensions::Chains(chains, self.hinges.clone()))
     }
 
     fn segments(&self, x: &[f64]) -> Vec<Segment> {

@@ -137,6 +137,12 @@ impl Urdf {
         None
     }
 
+    /// Name of the joint that carries a link.
+    pub fn joint_to(&self, link: &str) -> Option<&str> {
+        let joint = self.joints.iter().find(|j| j.child == link)?;
+        Some(joint.name.as_str())
+    }
+
     /// Names of all links, in document order.
     pub fn link_names(&self) -> impl Iterator<Item = &str> {
         self.links.iter().map(|l| l.name.as_str())

@@ -1,0 +1,196 @@
+//! The robot of a calibration: its chain, its joints, and the texts that a calibrated file is written from.
+
+use super::frame::Frame;
+use super::model::Kin;
+use super::parallel::Parallel;
+use super::serial::{Arm, Link};
+use crate::error::{Error, Result};
+use crate::mechanism::Mechanism;
+use crate::plant::Plant;
+use crate::robot::bundled;
+use crate::robot::file::names::did_you_mean;
+use crate::robot::urdf::Urdf;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A robot, opened.
+#[derive(Debug)]
+pub struct Opened {
+    /// the robot
+    pub plant: Plant,
+    /// its kinematics with errors
+    pub kin: Kin,
+    /// names of the joints whose readings are measured, in their order
+    pub joints: Vec<String>,
+    /// indices of these joints among the robot's
+    pub indices: Vec<usize>,
+    /// the frame that is measured
+    pub frame: String,
+    /// text of its URDF
+    pub urdf: Option<String>,
+    /// text of its `robot.toml`
+    pub toml: Option<String>,
+}
+
+/// Text of a file.
+fn text(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|e| Error::io(path, e))
+}
+
+/// Texts of a robot file: `robot.toml` where there is one, and URDF.
+fn texts(spec: &str) -> Result<(Option<String>, String)> {
+    let path = Path::new(spec);
+    if path.is_file() {
+        let own = text(path)?;
+        let is_toml = path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        if !is_toml {
+            return Ok((None, own));
+        }
+        let table: toml::Table = toml::from_str(&own)
+            .map_err(|e| Error::file(path, "", e.message().replace('\n', "; ")))?;
+        let urdf = table
+            .get("urdf")
+            .and_then(toml::Value::as_str)
+            .unwrap_or_default();
+        let beside = path.parent().unwrap_or(Path::new("")).join(urdf);
+        return Ok((Some(own), text(&beside)?));
+    }
+    match bundled::find(spec) {
+        Some(b) => Ok((Some(b.toml.to_string()), b.urdf.to_string())),
+        None => Err(Error::Argument(format!(
+            "`{spec}` is neither a file nor a bundled robot"
+        ))),
+    }
+}
+
+/// Opens the robot `spec` for a measurement of `frame`.
+///
+/// # Errors
+/// What reading a robot finds; a frame that there is not; a robot with several tips and no frame stated.
+pub fn open(spec: &str, frame: Option<&str>) -> Result<Opened> {
+    let plant = Plant::load(spec)?;
+    if let Some(mechanism) = plant.mechanism() {
+        return open_parallel(mechanism, frame, &plant);
+    }
+    let (toml, urdf_text) = texts(spec)?;
+    let urdf = Urdf::parse(&urdf_text, Path::new(spec))?;
+    let robot = plant.robot();
+    let mut lock = BTreeMap::new();
+    if let Some(t) = toml
+        .as_deref()
+        .and_then(|t| toml::from_str::<toml::Table>(t).ok())
+        && let Some(held) = t.get("lock").and_then(toml::Value::as_table)
+    {
+        for (name, v) in held {
+            let value = v.as_float().or(v.as_integer().map(|i| i as f64));
+            lock.insert(name.clone(), value.unwrap_or(0.0));
+        }
+    }
+    let is_body = |name: &str| robot.bodies.iter().any(|b| b.name == name);
+    let frame = match frame {
+        Some(f) => f.to_string(),
+        None => {
+            let is_leaf = |i: &usize| !robot.bodies.iter().any(|b| b.parent == Some(*i));
+            let leaves: Vec<usize> = (0..robot.bodies.len()).filter(is_leaf).collect();
+            match leaves[..] {
+                [one] => robot.bodies[one].name.clone(),
+                _ => {
+                    return Err(Error::Infeasible(format!(
+                        "{}: it has {} tips; state which one the measurement sees: frame = \"{}\"",
+                        plant.name(),
+                        leaves.len(),
+                        leaves
+                            .first()
+                            .map_or("link", |&l| robot.bodies[l].name.as_str())
+                    )));
+                }
+            }
+        }
+    };
+    let Some((body, rotation, position)) = urdf.frame(&frame, is_body, &lock) else {
+        return Err(Error::Infeasible(format!(
+            "{}: there is no link `{frame}`{}; frame names the link that the measurement sees",
+            plant.name(),
+            did_you_mean(&frame, urdf.link_names())
+        )));
+    };
+    let Some(body) = body.and_then(|b| robot.bodies.iter().position(|o| o.name == b)) else {
+        return Err(Error::Infeasible(format!(
+            "{}: link `{frame}` does not move; frame names the link that the measurement sees",
+            plant.name()
+        )));
+    };
+    let mut chain = vec![body];
+    while let Some(parent) = robot.bodies[chain[chain.len() - 1]].parent {
+        chain.push(parent);
+    }
+    chain.reverse();
+    let mut indices: Vec<usize> = Vec::new();
+    let mut links = Vec::new();
+    for b in chain {
+        let body = robot.bodies[b].clone();
+        let coordinate = match indices.iter().position(|&c| c == body.coordinate) {
+            Some(k) => k,
+            None => {
+                indices.push(body.coordinate);
+                indices.len() - 1
+            }
+        };
+        links.push(Link { body, coordinate });
+    }
+    let joints = indices
+        .iter()
+        .map(|&j| robot.joints[j].name.clone())
+        .collect();
+    let tip_joint = match is_body(&frame) {
+        true => None,
+        false => urdf.joint_to(&frame).map(str::to_string),
+    };
+    let kin = Kin::Arm(Arm {
+        links,
+        tip: Frame {
+            r: rotation,
+            p: position,
+        },
+        tip_joint,
+    });
+    Ok(Opened {
+        kin,
+        joints,
+        indices,
+        frame,
+        urdf: Some(urdf_text),
+        toml,
+        plant,
+    })
+}
+
+/// A parallel robot: its dimensions and the joint readings of its actuators.
+fn open_parallel(mechanism: &Mechanism, frame: Option<&str>, plant: &Plant) -> Result<Opened> {
+    let name = plant.name();
+    let parallel = Parallel::new(mechanism).ok_or_else(|| {
+        Error::Infeasible(format!(
+            "{name}: the geometry of a mechanism of kind `{}` cannot be calibrated; gough-stewart, h4, delta, serial \
+             robots and trees can",
+            mechanism.platform().source.name()
+        ))
+    })?;
+    if let Some(f) = frame.filter(|f| *f != "platform") {
+        return Err(Error::Infeasible(format!(
+            "{name}: frame = \"{f}\", but the measurement of a parallel robot sees its platform; remove frame, and \
+             let the target stand for the place on it"
+        )));
+    }
+    let text = mechanism.platform().text.clone();
+    Ok(Opened {
+        joints: parallel.mechanism.actuator_names(),
+        indices: parallel.mechanism.actuated.clone(),
+        kin: Kin::Parallel(Box::new(parallel)),
+        frame: "platform".into(),
+        urdf: None,
+        toml: (!text.is_empty()).then_some(text),
+        plant: plant.clone(),
+    })
+}

@@ -1,0 +1,270 @@
+//! Postures that the robot can take.
+
+use super::Request;
+use crate::calibrate::file::Kind;
+use crate::calibrate::frame::Frame;
+use crate::calibrate::model::Kin;
+use crate::calibrate::open::Opened;
+use crate::calibrate::parallel::Parallel;
+use crate::collision::Scene;
+use crate::collision::scene::{Balls, append_poses};
+use crate::error::{Error, Result, Warning, WarningKind};
+use nalgebra::{DMatrix, DVector, Vector3};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+/// One posture.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// joint readings
+    pub q: Vec<f64>,
+    /// task coordinates of a parallel robot
+    pub x: Vec<f64>,
+    /// pose of the frame, nominal
+    pub frame: Frame,
+    /// index of the point it reaches
+    pub point: usize,
+}
+
+/// Where postures are looked for.
+pub struct Search<'a> {
+    opened: &'a Opened,
+    request: &'a Request,
+    scene: Option<(Arc<Scene>, Balls)>,
+    /// range of each joint, or of each task coordinate
+    ranges: Vec<[f64; 2]>,
+    pairs: Vec<(usize, usize)>,
+    zeros: Vec<f64>,
+    pub warnings: Vec<Warning>,
+}
+
+/// Draws for each posture that is wanted before the search is given up.
+const DRAWS: usize = 60;
+/// Part of a range that is left free at both ends.
+const MARGIN: f64 = 0.03;
+/// Steps to a point, and how near counts as reached, m.
+const STEPS: usize = 30;
+const REACHED: f64 = 1e-9;
+
+impl<'a> Search<'a> {
+    /// For a robot.
+    ///
+    /// # Errors
+    /// Meshes that cannot be read; points for a robot that cannot be steered to them.
+    pub fn new(opened: &'a Opened, request: &'a Request) -> Result<Self> {
+        let plant = &opened.plant;
+        let mut warnings = plant.scene_warnings();
+        let scene = plant.scene()?.map(|s| {
+            let balls = Balls::new(&s);
+            (s, balls)
+        });
+        let inner = |[low, high]: [f64; 2]| {
+            let m = MARGIN * (high - low);
+            [low + m, high - m]
+        };
+        let (ranges, pairs) = match &opened.kin {
+            Kin::Arm(_) => {
+                let joints = &plant.robot().joints;
+                if scene.is_none() {
+                    warnings.push(Warning::new(
+                        WarningKind::CollisionNotChecked,
+                        plant.name(),
+                        "no volume of its links is known: postures may collide; look at each before it is taken",
+                    ));
+                }
+                let ranges = opened
+                    .indices
+                    .iter()
+                    .map(|&j| inner(joints[j].range()))
+                    .collect();
+                (ranges, Vec::new())
+            }
+            Kin::Parallel(p) => {
+                if request.kind == Kind::Point {
+                    return Err(Error::Argument(
+                        "--point is for serial robots; the platform of a parallel robot is seen by a camera or tracker"
+                            .into(),
+                    ));
+                }
+                let box_ = p
+                    .mechanism
+                    .workspace
+                    .iter()
+                    .map(|w| inner(w.position))
+                    .collect();
+                (box_, p.mechanism.pairs())
+            }
+        };
+        let zeros = vec![0.0; opened.kin.errors()];
+        Ok(Search {
+            opened,
+            request,
+            scene,
+            ranges,
+            pairs,
+            zeros,
+            warnings,
+        })
+    }
+
+    /// Names of the task coordinates of a parallel robot.
+    pub fn task_names(&self) -> Vec<String> {
+        match &self.opened.kin {
+            Kin::Arm(_) => Vec::new(),
+            Kin::Parallel(p) => p.mechanism.task_names.clone(),
+        }
+    }
+
+    /// Where the way begins: joints in the middle, or at zero where that is inside.
+    pub fn rest(&self) -> Vec<f64> {
+        match &self.opened.kin {
+            Kin::Arm(_) => self
+                .ranges
+                .iter()
+                .map(|[a, b]| 0.0f64.clamp(*a, *b))
+                .collect(),
+            Kin::Parallel(p) => p
+                .mechanism
+                .actuator_positions(&p.mechanism.home)
+                .unwrap_or_default(),
+        }
+    }
+
+    /// Candidates, and the number of draws.
+    ///
+    /// # Errors
+    /// None so far; the type is that of its callers.
+    pub fn draw(&mut self, rng: &mut ChaCha8Rng, wanted: usize) -> Result<(Vec<Candidate>, usize)> {
+        let mut found = Vec::new();
+        let mut draws = 0;
+        while found.len() < wanted && draws < DRAWS * wanted {
+            draws += 1;
+            let at: Vec<f64> = self
+                .ranges
+                .iter()
+                .map(|[a, b]| rng.random_range(*a..=*b))
+                .collect();
+            let point = found.len() % self.request.points.len().max(1);
+            found.extend(self.posture(at, point));
+            // a search without any room ends early
+            if draws >= 4000 && found.is_empty() {
+                break;
+            }
+        }
+        Ok((found, draws))
+    }
+
+    /// A posture a little away from another one.
+    pub fn near(&self, from: &Candidate, step: f64, rng: &mut ChaCha8Rng) -> Option<Candidate> {
+        let base = match &self.opened.kin {
+            Kin::Arm(_) => &from.q,
+            Kin::Parallel(_) => &from.x,
+        };
+        let moved = |(v, [a, b]): (&f64, &[f64; 2])| {
+            let d = step * (b - a);
+            (v + rng.random_range(-d..=d)).clamp(*a, *b)
+        };
+        let at: Vec<f64> = base.iter().zip(&self.ranges).map(moved).collect();
+        self.posture(at, from.point)
+    }
+
+    /// The posture of these coordinates, brought to its point where there is one; `None` where it cannot be taken.
+    fn posture(&self, mut at: Vec<f64>, point: usize) -> Option<Candidate> {
+        let candidate = match &self.opened.kin {
+            Kin::Arm(_) => {
+                if let Some(p) = self.request.points.get(point) {
+                    self.reach(&mut at, p)?;
+                }
+                let frame = self.opened.kin.nominal(&at).ok()?;
+                Candidate {
+                    q: at,
+                    x: Vec::new(),
+                    frame,
+                    point,
+                }
+            }
+            Kin::Parallel(p) => platform(p, at, &self.pairs)?,
+        };
+        let inside = |region: &[[f64; 2]; 3]| {
+            (0..3).all(|k| (region[k][0]..=region[k][1]).contains(&candidate.frame.p[k]))
+        };
+        if self.request.region.as_ref().is_some_and(|r| !inside(r)) || !self.clear(&candidate.q) {
+            return None;
+        }
+        Some(candidate)
+    }
+
+    /// Moves the joints until the frame's origin is in a point: least steps, by the Jacobian.
+    fn reach(&self, q: &mut [f64], to: &Vector3<f64>) -> Option<()> {
+        let Kin::Arm(arm) = &self.opened.kin else {
+            return None;
+        };
+        for _ in 0..STEPS {
+            let at = self.opened.kin.nominal(q).ok()?.p;
+            let gap = to - at;
+            if gap.norm() < REACHED {
+                let inside = q
+                    .iter()
+                    .zip(&self.ranges)
+                    .all(|(v, [a, b])| (*a..=*b).contains(v));
+                return inside.then_some(());
+            }
+            let j = arm.by_joints(q, &self.zeros);
+            let gap =
+                DVector::from_iterator(3, (gap * (0.2 / gap.norm()).min(1.0)).iter().copied());
+            let jt = j.transpose();
+            let square: DMatrix<f64> = &j * &jt + DMatrix::identity(3, 3) * 1e-8;
+            let step = jt * square.cholesky()?.solve(&gap);
+            for (v, d) in q.iter_mut().zip(step.iter()) {
+                *v += d;
+            }
+        }
+        None
+    }
+
+    /// Whether nothing touches.
+    fn clear(&self, q: &[f64]) -> bool {
+        let Some((scene, balls)) = &self.scene else {
+            return true;
+        };
+        let robot = self.opened.plant.robot();
+        let mut all: Vec<f64> = robot
+            .joints
+            .iter()
+            .map(|j| {
+                let [a, b] = j.range();
+                0.0f64.clamp(a, b)
+            })
+            .collect();
+        for (&j, v) in self.opened.indices.iter().zip(q) {
+            all[j] = *v;
+        }
+        let mut poses = Vec::new();
+        append_poses(robot, &all, &mut poses);
+        scene.pairs.iter().all(|pair| {
+            balls.lower_bound(pair, &poses) > pair.margin
+                || scene.separation(pair, &poses).distance > pair.margin
+        })
+    }
+}
+
+/// A pose of a platform: inside the limits of its actuators and its margins.
+fn platform(p: &Parallel, x: Vec<f64>, pairs: &[(usize, usize)]) -> Option<Candidate> {
+    let m = &p.mechanism;
+    let q = m.actuator_positions(&x).ok()?;
+    let inside = m.actuated.iter().zip(&q).all(|(&a, v)| {
+        let [low, high] = m.robot.joints[a].limits.position;
+        (low..=high).contains(v)
+    });
+    if !inside || m.pose_uses(&x, pairs).iter().any(|u| !(u.used() <= 1.0)) {
+        return None;
+    }
+    let frame = p.frame_of(&x);
+    Some(Candidate {
+        q,
+        x,
+        frame,
+        point: 0,
+    })
+}

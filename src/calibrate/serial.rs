@@ -1,0 +1,145 @@
+//! Serial robots and trees: the chain from the base to the frame that the measurement sees.
+//!
+//! Joint `i` sits in the frame before at `X_i E_i M_i(q)`: `X_i` as in the robot file, `E_i` six small errors
+//! (a shift in the axes of `X_i`, then a rotation vector), `M_i` the motion of the joint. Behind the last joint
+//! comes the frame's own place, with errors `E` where a fixed joint of the file holds it. The six errors contain
+//! joint offset, link lengths, twists and the parameter of Hayati for near-parallel axes; those that a
+//! neighbouring frame expresses as well are told apart by their tolerances alone
+//! (see [`identifiable`](super::identifiable)).
+
+use super::effects::Feature;
+use super::frame::{Frame, right_jacobian};
+use super::unknown::{Part, Unknown};
+use crate::robot::{Body, Motion};
+use nalgebra::{DMatrix, Vector3};
+
+/// One joint of the chain.
+#[derive(Debug, Clone)]
+pub struct Link {
+    /// the body, as in the robot file
+    pub body: Body,
+    /// index of its coordinate among those that are measured
+    pub coordinate: usize,
+}
+
+/// A chain of joints.
+#[derive(Debug, Clone)]
+pub struct Arm {
+    /// joints from the base to the tip
+    pub links: Vec<Link>,
+    /// the frame on the last body
+    pub tip: Frame,
+    /// name of the fixed joint whose errors are identified; `None` where the frame is the last body's
+    pub tip_joint: Option<String>,
+}
+
+/// Pose of a frame, and by how much it moves with each unknown of the robot: position and rotation in base
+/// axes.
+#[derive(Debug, Clone)]
+pub struct Posed {
+    /// pose in the base frame
+    pub frame: Frame,
+    /// `6 × unknowns`
+    pub jacobian: DMatrix<f64>,
+}
+
+impl Arm {
+    /// Number of geometric unknowns.
+    pub fn errors(&self) -> usize {
+        6 * (self.links.len() + usize::from(self.tip_joint.is_some()))
+    }
+
+    /// The geometric unknowns.
+    pub fn unknowns(&self, tolerance: [f64; 2]) -> Vec<Unknown> {
+        let names = self.links.iter().map(|l| l.body.joint_name.as_str());
+        names
+            .chain(self.tip_joint.as_deref())
+            .flat_map(|n| Unknown::frame(n, Part::Geometry, tolerance))
+            .collect()
+    }
+
+    /// Shift of the frame's origin by each joint, `3 × joints`, at the errors `x` of the geometry.
+    pub fn by_joints(&self, q: &[f64], x: &[f64]) -> DMatrix<f64> {
+        let features: Vec<Feature> = (0..q.len()).map(Feature::turn).collect();
+        let ones = vec![1.0; q.len()];
+        let all: Vec<f64> = x.iter().copied().chain(ones.iter().map(|_| 0.0)).collect();
+        let posed = self.pose(q, &all, &features, &ones);
+        posed
+            .jacobian
+            .view((0, self.errors()), (3, q.len()))
+            .into_owned()
+    }
+
+    /// Pose at joint readings `q`, with errors `x` (geometry, then one number a feature). `rate` holds the value of
+    /// each feature in this posture: the change of its joint per unit.
+    pub fn pose(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[f64]) -> Posed {
+        let n = self.errors();
+        let mut j = DMatrix::zeros(6, n + features.len());
+        let mut at = Frame::identity();
+        // axis and origin of each joint, and of the frames of the errors
+        let mut joints = Vec::with_capacity(self.links.len());
+        let mut places = Vec::with_capacity(self.links.len() + 1);
+        for (i, link) in self.links.iter().enumerate() {
+            let b = &link.body;
+            at = at.then(&Frame {
+                r: b.rotation,
+                p: b.position,
+            });
+            places.push((i, at));
+            at = at.then(&Frame::small(&x[6 * i..6 * i + 6]));
+            let mut s = b.ratio * q[link.coordinate] + b.offset;
+            for (k, f) in features.iter().enumerate() {
+                if f.joint == link.coordinate {
+                    s += b.ratio * x[n + k] * rate[k];
+                }
+            }
+            joints.push((link.coordinate, b.motion, b.ratio, at.r * b.axis, at.p));
+            let motion = match b.motion {
+                Motion::Revolute => Frame {
+                    r: super::frame::exp(&(b.axis * s)),
+                    p: Vector3::zeros(),
+                },
+                Motion::Prismatic => Frame {
+                    p: b.axis * s,
+                    ..Frame::identity()
+                },
+            };
+            at = at.then(&motion);
+        }
+        at = at.then(&self.tip);
+        if self.tip_joint.is_some() {
+            let i = self.links.len();
+            places.push((i, at));
+            at = at.then(&Frame::small(&x[6 * i..6 * i + 6]));
+        }
+        let mut put = |column: usize, shift: Vector3<f64>, turn: Vector3<f64>| {
+            for k in 0..3 {
+                j[(k, column)] += shift[k];
+                j[(3 + k, column)] += turn[k];
+            }
+        };
+        for (i, before) in &places {
+            let e = &x[6 * i..6 * i + 6];
+            let after = before.then(&Frame::small(e));
+            let turns = after.r * right_jacobian(&Vector3::new(e[3], e[4], e[5]));
+            for k in 0..3 {
+                put(6 * i + k, before.r.column(k).into_owned(), Vector3::zeros());
+                let w = turns.column(k).into_owned();
+                put(6 * i + 3 + k, w.cross(&(at.p - after.p)), w);
+            }
+        }
+        for (k, f) in features.iter().enumerate() {
+            for (_, motion, ratio, axis, origin) in joints.iter().filter(|(c, ..)| *c == f.joint) {
+                let v = axis * (ratio * rate[k]);
+                match motion {
+                    Motion::Revolute => put(n + k, v.cross(&(at.p - origin)), v),
+                    Motion::Prismatic => put(n + k, v, Vector3::zeros()),
+                }
+            }
+        }
+        Posed {
+            frame: at,
+            jacobian: j,
+        }
+    }
+}

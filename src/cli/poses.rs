@@ -1,0 +1,170 @@
+//! `excite poses ROBOT`.
+
+use super::{Collisions, Folder, pretty, print, warn};
+use clap::ValueEnum;
+use excite::calibrate::{self, Kind, Tolerances, poses};
+use excite::{Error, Result};
+use nalgebra::Vector3;
+use std::path::PathBuf;
+
+/// Choose postures for a calibration.
+#[derive(clap::Args)]
+#[command(
+    long_about = "Choose postures for a calibration: inside the limits, free of collision, and such that the tool is \
+                  known best afterwards.\n\nROBOT is a robot.toml, a URDF or a bundled robot. Writes poses.csv (joint \
+                  readings, in an order with a short way), report.json and report.html, which compares them with \
+                  random ones.",
+    after_help = "Examples:\n  excite poses ur5e --count 40\n  excite poses h4 --count 45 --std 0.0003 --angle-std \
+                  0.00035\n  excite poses panda --kind point --point 0.5,0,0.1 --point 0.4,0.3,0.1"
+)]
+pub struct Args {
+    /// Robot: a robot.toml, a URDF, or the name of a bundled one
+    robot: String,
+    /// Directory for poses.csv, report.json and report.html
+    #[arg(short, long, default_value = "out")]
+    output: PathBuf,
+    /// Replace files that exist
+    #[arg(long)]
+    force: bool,
+    /// Number of postures
+    #[arg(short = 'n', long, default_value_t = 50)]
+    count: usize,
+    /// What will be measured
+    #[arg(long, value_enum, default_value = "pose")]
+    kind: What,
+    /// Link that the measurement sees [default: the last one]
+    #[arg(long, value_name = "LINK")]
+    frame: Option<String>,
+    /// Fixed point for the frame's origin, x,y,z in the base, m; may be given several times
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    point: Vec<f64>,
+    /// Box that the frame's origin must stay in, such as what the camera sees:
+    /// x0,x1,y0,y1,z0,z1 in the base, m
+    #[arg(
+        long,
+        value_name = "BOX",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    within: Vec<f64>,
+    /// Noise of a measured position, m
+    #[arg(long, value_name = "M", default_value_t = 0.0003)]
+    std: f64,
+    /// Noise of a measured orientation, rad
+    #[arg(long, value_name = "RAD", default_value_t = 0.00035)]
+    angle_std: f64,
+    /// Manufacturing tolerance of lengths, m
+    #[arg(long, value_name = "M", default_value_t = 0.002)]
+    length: f64,
+    /// Manufacturing tolerance of angles, rad
+    #[arg(long, value_name = "RAD", default_value_t = 0.005)]
+    angle: f64,
+    /// Random postures to choose from
+    #[arg(long, default_value_t = 5000)]
+    candidates: usize,
+    /// Seed of all draws
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    #[command(flatten)]
+    collisions: Collisions,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum What {
+    Pose,
+    Position,
+    Point,
+}
+
+pub fn run(args: Args) -> Result<()> {
+    for (name, value) in [
+        ("std", args.std),
+        ("angle-std", args.angle_std),
+        ("length", args.length),
+        ("angle", args.angle),
+    ] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(Error::Argument(format!(
+                "--{name} must be positive, not {value}"
+            )));
+        }
+    }
+    const MOST: usize = 200_000;
+    if args.candidates == 0 || args.candidates > MOST || args.count > 2000 {
+        return Err(Error::Argument(format!(
+            "--candidates is between 1 and {MOST}, --count at most 2000"
+        )));
+    }
+    let finite = args.point.iter().chain(&args.within).all(|v| v.is_finite());
+    if !finite || args.point.len() % 3 != 0 || !matches!(args.within.len(), 0 | 6) {
+        return Err(Error::Argument(
+            "--point takes three numbers, --within six, separated by commas".into(),
+        ));
+    }
+    let kind = match args.kind {
+        What::Pose => Kind::Pose,
+        What::Position => Kind::Position,
+        What::Point => Kind::Point,
+    };
+    if (kind == Kind::Point) == args.point.is_empty() {
+        return Err(Error::Argument(
+            "--kind point needs a --point X,Y,Z or several, and other kinds have none".into(),
+        ));
+    }
+    let region = match args.within[..] {
+        [a, b, c, d, e, f] => {
+            if !(a < b && c < d && e < f) {
+                return Err(Error::Argument(
+                    "--within: each lower end must be below the upper".into(),
+                ));
+            }
+            Some([[a, b], [c, d], [e, f]])
+        }
+        _ => None,
+    };
+    let mut opened = calibrate::open(&args.robot, args.frame.as_deref())?;
+    opened.plant = args.collisions.apply(opened.plant);
+    let request = poses::Request {
+        count: args.count,
+        kind,
+        points: args
+            .point
+            .chunks(3)
+            .map(Vector3::from_column_slice)
+            .collect(),
+        region,
+        std: [args.std, args.angle_std],
+        tolerances: Tolerances {
+            length: args.length,
+            angle: args.angle,
+            ..Tolerances::default()
+        },
+        candidates: args.candidates,
+        seed: args.seed,
+    };
+    let names = ["poses.csv", "report.json", "report.html"];
+    let folder = Folder::new(&args.output, &names, args.force)?;
+    let found = poses::choose(&opened, &request)?;
+    warn(&found.warnings);
+    let files = [
+        folder.write(names[0], &found.csv())?,
+        folder.write(names[1], &pretty(&found.json()))?,
+        folder.write(names[2], &poses::page::html(&found))?,
+    ];
+    let mut out = format!(
+        "{}: {} postures leave the tool uncertain by {:.4} mm, as many random ones by {:.4} mm\n",
+        found.robot,
+        found.postures.len(),
+        1e3 * found.predicted,
+        1e3 * found.random_middle()
+    );
+    for f in files {
+        out += &format!("wrote {}\n", f.display());
+    }
+    print(&out)
+}
