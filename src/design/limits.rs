@@ -11,6 +11,7 @@
 //! others are rows, and shrink by the same rule.
 
 use super::by_position::{Cone, peaks, stands};
+use crate::conic::Problem;
 use crate::robot::{Robot, Side};
 use crate::trajectory::{Basis, Extremum, Series, Table, extrema_fast};
 
@@ -55,6 +56,18 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Writes them for scaled steps of `m` free numbers a joint.
+    pub fn write(&self, p: &mut Problem, m: usize, scale: &[f64]) {
+        for cone in &self.cones {
+            cone.write(p, cone.joint * m, scale[cone.joint]);
+        }
+        for row in &self.linear {
+            let s = scale[row.joint];
+            let entries = row.row.iter().enumerate();
+            p.inequality(entries.map(|(k, r)| (row.joint * m + k, r * s)), row.slack);
+        }
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         self.linear.len() + self.cones.len()

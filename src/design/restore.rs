@@ -60,11 +60,8 @@ pub fn restore(
         p.linear(n, EXCESS);
         p.bounds(n, 0.0, 1.0);
         (0..n).for_each(|k| p.bounds(k, -REACH, REACH));
-        for row in task.limits.rows(&x, NEAR, &mut work) {
-            let s = task.scale[row.joint];
-            let entries = row.row.iter().enumerate();
-            p.inequality(entries.map(|(k, r)| (row.joint * m + k, r * s)), row.slack);
-        }
+        let rows = task.limits.rows(&x, NEAR, &mut work);
+        rows.write(p, m, task.scale);
         for row in limits.rows(task.info, &x, &mut e, NEAR) {
             let scaled = row.gradient.iter().enumerate();
             let excess = (-row.slack).max(0.0);

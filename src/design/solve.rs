@@ -366,18 +366,7 @@ impl State {
                 }
             }
         }
-        for cone in &rows.cones {
-            cone.write(p, cone.joint * m, task.scale[cone.joint]);
-        }
-        for row in &rows.linear {
-            let s = task.scale[row.joint];
-            let entries = row
-                .row
-                .iter()
-                .enumerate()
-                .map(|(k, r)| (row.joint * m + k, r * s));
-            p.inequality(entries, row.slack);
-        }
+        rows.write(p, m, task.scale);
         for row in path_rows {
             let scaled = row.gradient.iter().enumerate();
             p.inequality(scaled.map(|(k, g)| (k, g * task.scale[k / m])), row.slack);
