@@ -131,6 +131,8 @@ warning_kinds! {
     GeometryUnread = "geometry_unread",
     /// Collisions are looked at in part or not at all; the message says what was left out.
     CollisionNotChecked = "collision_not_checked",
+    /// Two links can hardly be moved apart; they keep a part of their distance instead of the margin.
+    MarginReduced = "margin_reduced",
     /// A kinematic loop does not close exactly; it is closed as well as possible.
     LoopOpen = "loop_open",
     /// There are more actuators than freedoms; the forces of least norm are used.

@@ -2,7 +2,9 @@
 //!
 //! A pair is two volumes of different links, or a volume that moves and an obstacle. Left out are links that a
 //! joint joins, pairs that the robot file or its SRDF names, and pairs that are nearer than the margin in every
-//! one of many random postures: no motion can keep them apart. Every other pair stays, however far apart.
+//! one of many random postures: no motion can keep them apart. Every other pair stays, however far apart. Two links
+//! that can hardly be moved apart, as every second one of a wrist, keep half of their median distance instead of the
+//! margin.
 
 use super::scene::{Balls, LeftOut, Pair, Partner, Scene, Volume, poses};
 use super::srdf;
@@ -12,6 +14,7 @@ use crate::robot::geometry::{Geometry, MARGIN, Obstacle};
 use crate::solid::{Pose, Shape};
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// The base may reach this far below the plane `z = 0` and the plane be a floor all the same, m.
 const SUNK: f64 = 0.03;
@@ -19,6 +22,12 @@ const SUNK: f64 = 0.03;
 const HARDLY: f64 = 1e-3;
 /// Room beyond which a posture is spacious, however much more there is, m.
 const FAR: f64 = 0.05;
+/// Two links can hardly be moved apart where their room is less than this, m …
+const SLIM: f64 = 5e-3;
+/// … in this part of the postures.
+const NEARLY_ALL: f64 = 0.9;
+/// They keep this part of their median distance.
+const PART: f64 = 0.5;
 /// Free postures that are kept.
 const KEPT: usize = 400;
 
@@ -286,7 +295,7 @@ impl Scene {
             return Ok(());
         }
         let balls = Balls::new(self);
-        let rooms: Vec<Vec<f64>> = postures
+        let mut rooms: Vec<Vec<f64>> = postures
             .par_iter()
             .map(|q| {
                 let mut at = Vec::new();
@@ -298,6 +307,7 @@ impl Scene {
                 self.pairs.iter().map(room).collect()
             })
             .collect();
+        self.own_margins(&mut rooms);
         // what stands around can be too near for ever only of a body that the base carries
         let may_stay = |pair: &Pair| match pair.partner {
             Partner::Volume(_) => true,
@@ -358,6 +368,47 @@ impl Scene {
         let mut never = never.into_iter();
         self.pairs.retain(|_| !never.next().unwrap_or(false));
         Ok(())
+    }
+
+    /// Links that can hardly be moved apart keep `PART` of their median distance over the postures, where that is
+    /// less than the margin and not next to nothing. `rooms`: beyond the margin, posture by posture and pair by pair.
+    fn own_margins(&mut self, rooms: &mut [Vec<f64>]) {
+        let mut links: BTreeMap<[String; 2], Vec<usize>> = BTreeMap::new();
+        for (p, pair) in self.pairs.iter().enumerate() {
+            if matches!(pair.partner, Partner::Volume(_)) {
+                let names = self.names(pair).map(String::from);
+                links.entry(names).or_default().push(p);
+            }
+        }
+        let mut told = Vec::new();
+        for ([a, b], pairs) in links {
+            let nearest = |r: &Vec<f64>| pairs.iter().map(|p| r[*p]).fold(f64::INFINITY, f64::min);
+            let mut room: Vec<f64> = rooms.iter().map(nearest).collect();
+            room.sort_by(f64::total_cmp);
+            let at = |part: f64| room[(part * (room.len() - 1) as f64) as usize];
+            let own = PART * (self.margin + at(0.5));
+            if at(NEARLY_ALL) >= SLIM || own < HARDLY || own >= self.margin {
+                continue;
+            }
+            for &p in &pairs {
+                self.pairs[p].margin = own;
+                for r in rooms.iter_mut() {
+                    r[p] += self.margin - own;
+                }
+            }
+            told.push(format!("{a} and {b} {:.1} mm", 1e3 * own));
+        }
+        if !told.is_empty() {
+            self.warnings.push(Warning::new(
+                WarningKind::MarginReduced,
+                "collisions",
+                format!(
+                    "links that can hardly be moved apart keep half of their median distance instead of {:.1} mm: {}",
+                    1e3 * self.margin,
+                    told.join("; ")
+                ),
+            ));
+        }
     }
 
     /// Which pairs leave no free posture: those in contact most often.
