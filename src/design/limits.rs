@@ -85,6 +85,10 @@ pub struct Row {
     pub slack: f64,
 }
 
+/// Cones, which cost more than rows, stand at instants that use more than this of a velocity by position; what
+/// another instant breaks is cut.
+const NEAR_CONE: f64 = 0.8;
+
 /// Fraction of every limit that the optimiser leaves free, so that rounding in the coefficients
 /// cannot break one.
 const MARGIN: f64 = 1e-11;
@@ -243,6 +247,7 @@ impl Limits {
                     self.push(j, b, &self.row(b.order, e.time), x_j, near, &mut rows);
                 }
             }
+            let near = near.max(NEAR_CONE);
             for side in &self.sides[j] {
                 for rows in self.grid[0].iter().zip(&self.grid[1]) {
                     self.cone(j, side, [rows.0, rows.1], x_j, near, &mut cones);

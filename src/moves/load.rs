@@ -15,6 +15,8 @@ const FEWEST: usize = 100;
 const MOST: usize = 4000;
 /// Factor at which a leg counts as standing.
 const SLOWEST: f64 = 1e6;
+/// Times that a slowed leg is slowed by another hundredth, where its own samples ask for it.
+const AGAIN: usize = 30;
 /// Share of a limit that counts as kept.
 const KEPT: f64 = 1.0 + 1e-6;
 
@@ -220,7 +222,16 @@ pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Mos
             false => low = middle,
         }
     }
-    Ok(Ok(leg.stretched(high)))
+    let mut slow = leg.stretched(high);
+    // its own samples lie elsewhere than those that were slowed
+    for _ in 0..AGAIN {
+        let (x, step) = samples(&slow);
+        if most(plant, &x, step, share)?.kept() {
+            break;
+        }
+        slow = slow.stretched(1.01);
+    }
+    Ok(Ok(slow))
 }
 
 /// Largest speed and acceleration of the tool point of all legs.

@@ -7,6 +7,7 @@
 //! files (`file`, [`samples`]).
 
 pub(crate) mod basis;
+pub(crate) mod bounds;
 pub(crate) mod by_position;
 #[doc(hidden)]
 pub mod certificate;
@@ -28,10 +29,9 @@ pub(crate) mod torque;
 #[doc(hidden)]
 pub use basis::Basis;
 pub use basis::Ends;
+pub use bounds::{SampledBound, TorqueBound};
 pub use by_position::PositionPeak;
-pub use certificate::{
-    Certificate, JointCertificate, Peak, Proof, Range, SampledBound, TorqueBound, certify,
-};
+pub use certificate::{Certificate, JointCertificate, Peak, Proof, Range, certify};
 #[doc(hidden)]
 pub use extrema::{Extrema, Extremum, extrema};
 #[doc(hidden)]

@@ -1,6 +1,7 @@
 //! Speed and acceleration of the tool point over all time.
 
-use super::certificate::{SampledBound, TOLERANCE, check};
+use super::bounds::SampledBound;
+use super::certificate::check;
 use super::enclose::{Motion, enclose};
 use super::fourier::Fourier;
 use super::jets::point_jet;
@@ -26,9 +27,7 @@ impl ToolCertificate {
     /// Whether the bounds stay within the limits.
     pub fn satisfied(&self) -> bool {
         let both = [&self.speed, &self.acceleration];
-        both.into_iter()
-            .flatten()
-            .all(|b| b.bound() <= b.limit * (1.0 + TOLERANCE))
+        both.into_iter().flatten().all(SampledBound::satisfied)
     }
 }
 

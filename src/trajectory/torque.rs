@@ -1,6 +1,7 @@
 //! Torque and its rate over all time: samples, and a proof of what happens between them.
 
-use super::certificate::{SampledBound, TorqueBound, check};
+use super::bounds::{SampledBound, TorqueBound};
+use super::certificate::check;
 use super::enclose::{Enclosed, Motion, enclose};
 use super::fourier::Fourier;
 use super::jets::Norms;

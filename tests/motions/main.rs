@@ -8,4 +8,5 @@ mod conic;
 mod controller_limits;
 mod design;
 mod moves;
+mod rates_and_tool;
 mod trajectory;

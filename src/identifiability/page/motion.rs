@@ -28,7 +28,7 @@ fn heading(kind: Kind, robot: &Robot) -> &'static str {
         Kind::Torque if robot.joints.iter().all(|j| slides(j.motion)) => "Force",
         Kind::Torque if robot.joints.iter().any(|j| slides(j.motion)) => "Torque or force",
         Kind::Torque => "Torque",
-        Kind::VelocityByPosition => "Velocity by position",
+        Kind::VelocityByPosition => "… by position",
         Kind::TorqueRate => "Rate of torque",
         Kind::ToolSpeed => "Speed of the tool point",
         Kind::ToolAcceleration => "Acceleration of the tool point",
@@ -212,8 +212,8 @@ fn numbers(robot: &Robot, e: &Excitation) -> Markup {
                     Some(p) => html! {
                         (peak(&c.velocity)) br;
                         small {
-                            (significant(p.velocity, 4)) " where " (significant(p.limit, 4)) " is allowed, at "
-                            (significant(p.position, 4)) ", t = " (significant(p.time, 4)) "\u{a0}s"
+                            (significant(p.velocity, 4)) " of " (significant(p.limit, 4)) " allowed" br;
+                            "at " (significant(p.position, 4)) ", t = " (significant(p.time, 4)) "\u{a0}s"
                         }
                     },
                     None => peak(&c.velocity),
@@ -260,7 +260,8 @@ pub(super) fn usage(robot: &Robot, e: &Excitation) -> Section {
     ];
     let joints = &e.certificate.joints;
     if joints.iter().any(|c| c.velocity_by_position.is_some()) {
-        kinds.push(Kind::VelocityByPosition);
+        // beside the velocity
+        kinds.insert(2, Kind::VelocityByPosition);
     }
     if joints.iter().any(|c| c.torque_rate.is_some()) {
         kinds.push(Kind::TorqueRate);
@@ -328,7 +329,7 @@ pub(super) fn usage(robot: &Robot, e: &Excitation) -> Section {
          a bar of torque or of its rate is what may be missing between samples."
         @if joints.iter().any(|c| c.velocity_by_position.is_some()) {
             " Velocity by position is the share of the velocity that the controller allows where the joint is, at \
-             the worst instant; it is proven for all time."
+             the worst instant. It is proven for all time."
         }
     };
     let body = html! {

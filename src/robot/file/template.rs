@@ -53,53 +53,15 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
         } else {
             let _ = writeln!(out, "# position = [-1.0, 1.0]     # {angle}: unlimited");
         }
-        let mut key = |key: &str, value: Option<f64>, example: f64, comment: &str| {
-            let _ = match value {
-                Some(v) => writeln!(out, "{key} = {v:?}     # {comment}"),
-                None => writeln!(out, "# {key} = {example:?}     # {comment}"),
-            };
-        };
+        let out = &mut out;
         let finite = |x: f64| x.is_finite().then_some(x);
         let l = &joint.limits;
-        key("velocity", finite(l.velocity), 2.0, &format!("{angle}/s"));
         key(
-            "acceleration",
-            finite(l.acceleration),
-            10.0,
-            &format!("{angle}/s^2"),
-        );
-        key("jerk", finite(l.jerk), 1000.0, &format!("{angle}/s^3"));
-        key("effort", finite(l.effort), 50.0, torque);
-        key(
-            "effort_rate",
-            finite(l.effort_rate),
-            1000.0,
-            &format!("{torque}/s"),
-        );
-        key(
-            "torque_noise",
-            joint.torque_noise,
-            0.1,
-            &format!("{torque}: standard deviation of the measured torque"),
-        );
-        key(
-            "position_resolution",
-            joint.position_resolution,
-            1e-5,
-            &format!("{angle}: encoder step"),
-        );
-        key("gear_ratio", joint.gear_ratio, 100.0, gear);
-        key(
-            "continuous_torque",
-            joint.continuous_torque,
-            25.0,
-            &format!("{torque}: root mean square that it bears for ever"),
-        );
-        key(
-            "continuous_power",
-            joint.continuous_power,
-            100.0,
-            "W: mean mechanical power that it bears for ever",
+            out,
+            "velocity",
+            finite(l.velocity),
+            2.0,
+            &format!("{angle}/s"),
         );
         let (hash, by_position) = match l.velocity_by_position {
             Some(v) => ("", v),
@@ -111,27 +73,68 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
              # velocity is at most sqrt(2 deceleration (end - position)) - offset towards an end",
             by_position.deceleration, by_position.offset, by_position.position
         );
-        let mut key = |key: &str, value: Option<f64>, example: f64, comment: &str| {
-            let _ = match value {
-                Some(v) => writeln!(out, "{key} = {v:?}     # {comment}"),
-                None => writeln!(out, "# {key} = {example:?}     # {comment}"),
-            };
-        };
+        key(
+            out,
+            "acceleration",
+            finite(l.acceleration),
+            10.0,
+            &format!("{angle}/s^2"),
+        );
+        key(out, "jerk", finite(l.jerk), 1000.0, &format!("{angle}/s^3"));
+        key(out, "effort", finite(l.effort), 50.0, torque);
+        key(
+            out,
+            "effort_rate",
+            finite(l.effort_rate),
+            1000.0,
+            &format!("{torque}/s"),
+        );
+        key(
+            out,
+            "torque_noise",
+            joint.torque_noise,
+            0.1,
+            &format!("{torque}: standard deviation of the measured torque"),
+        );
+        key(
+            out,
+            "position_resolution",
+            joint.position_resolution,
+            1e-5,
+            &format!("{angle}: encoder step"),
+        );
+        key(out, "gear_ratio", joint.gear_ratio, 100.0, gear);
+        key(
+            out,
+            "continuous_torque",
+            joint.continuous_torque,
+            25.0,
+            &format!("{torque}: root mean square that it bears for ever"),
+        );
+        key(
+            out,
+            "continuous_power",
+            joint.continuous_power,
+            100.0,
+            "W: mean mechanical power that it bears for ever",
+        );
         let [armature, viscous, coulomb, offset] = joint.terms;
         key(
+            out,
             "armature",
             Some(armature),
             0.0,
             &format!("{inertia}: rotor inertia at the joint"),
         );
         key(
+            out,
             "viscous",
             Some(viscous),
             0.0,
             &format!("{torque} s/{angle}"),
         );
-        key("coulomb", Some(coulomb), 0.0, torque);
-        key("offset", Some(offset), 0.0, torque);
+        key(out, "coulomb", Some(coulomb), 0.0, torque);
+        key(out, "offset", Some(offset), 0.0, torque);
         let identify: Vec<String> = JointTerm::ALL
             .into_iter()
             .zip(joint.identify)
@@ -147,6 +150,15 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
     tool(robot, &mut out);
     surroundings(robot, &mut out);
     out
+}
+
+/// A line for a key; commented out where it has no value.
+fn key(out: &mut String, key: &str, value: Option<f64>, example: f64, comment: &str) {
+    // writing to a String cannot fail
+    let _ = match value {
+        Some(v) => writeln!(out, "{key} = {v:?}     # {comment}"),
+        None => writeln!(out, "# {key} = {example:?}     # {comment}"),
+    };
 }
 
 /// `[tool]`, its frame the link that carries it.
