@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod formats;
 mod log;
 mod signals;
 mod simulate;
