@@ -7,6 +7,7 @@ mod export;
 mod identifiability;
 mod identify;
 mod load;
+mod log;
 mod moves;
 mod new;
 mod rehearse;
@@ -48,6 +49,7 @@ enum Command {
     Simulate(simulate::Args),
     Export(export::Args),
     Load(load::Args),
+    Log(log::Args),
     Robots(robots::Args),
     New(new::Args),
 }
@@ -66,6 +68,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(a) => simulate::run(a),
         Command::Export(a) => export::run(a),
         Command::Load(a) => load::run(a),
+        Command::Log(a) => log::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
     };

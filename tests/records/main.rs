@@ -7,3 +7,4 @@ mod formats;
 mod log;
 mod signals;
 mod simulate;
+mod survey;
