@@ -178,7 +178,9 @@ fn idle(word: &str) -> bool {
 
 /// Whether a name is one of a time.
 fn time(name: &str) -> Option<Option<&'static str>> {
-    let words = words(name);
+    // of a path or of a field of a structure, its last part
+    let last = name.rsplit(['.', '/']).next().unwrap_or(name);
+    let words = words(if last.is_empty() { name } else { last });
     let known = |w: &str| {
         matches!(
             w,

@@ -166,7 +166,9 @@ fn look(
             });
     }
     followers(claims, &positions);
-    families(&smooth, claims, &matches, &torques, plant, best, &usual);
+    families(
+        &smooth, claims, &matches, &torques, plant, best, &usual, &verdict,
+    );
     blocks(claims, plant);
 }
 

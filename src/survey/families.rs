@@ -3,11 +3,14 @@
 use super::claim::{Claim, Means};
 use super::kinematics::Smooth;
 use super::search::{Hypothesis, Match};
-use super::verdict::{Orientation, SHARE};
+use super::verdict::{Orientation, SHARE, Verdict};
 use crate::plant::Plant;
 
 /// Margin of a joint over all others for a column of torques, in shares left unexplained.
 const AHEAD: f64 = 0.6;
+
+/// Least share of what friction leaves that the bodies explain, for a gain to be told.
+const RIGID: f64 = 0.3;
 
 /// Columns of torques and currents: joint, gain, what is missing in them.
 pub(super) fn families(
@@ -18,6 +21,7 @@ pub(super) fn families(
     plant: &Plant,
     best: &Hypothesis,
     usual: &[Orientation],
+    verdict: &Verdict,
 ) {
     let n = best.column.len();
     let joints = plant.actuators();
@@ -31,7 +35,10 @@ pub(super) fn families(
             .fold(0.0, f64::max);
         of.push(j.filter(|&j| {
             let share = matches[j][c].share;
-            usual[j].known && share > SHARE && (1.0 - share) < AHEAD * (1.0 - second)
+            usual[j].known
+                && verdict.torque[c]
+                && share > SHARE
+                && (1.0 - share) < AHEAD * (1.0 - second)
         }));
     }
     let gain = |c: usize, j: usize| matches[j][c].gain;
@@ -43,6 +50,12 @@ pub(super) fn families(
             let k = torques[c];
             let (m, g) = (matches[j][c], gain(c, j));
             let made = rank > 0 && smooth.grain[k] < 0.5 * smooth.grain[torques[mine[0]]];
+            if m.rigid < RIGID && best.column.len() > 1 {
+                claims[k].abstain(
+                    "it goes with the friction of a joint; its gain and what it is the bodies do not tell",
+                );
+                continue;
+            }
             if rank > 0 && !made {
                 claims[k].abstain(
                     "a second column of the same joint's torque that cannot be told from the first",

@@ -260,7 +260,7 @@ impl Frame {
 /// its encoder.
 fn still_aware(q: &[f64], step: f64) -> Vec<bool> {
     let n = q.len();
-    let k = ((0.1 / step) as usize).clamp(2, n.max(5) / 4);
+    let k = ((0.1 / step) as usize).clamp(2, (n / 4).max(2));
     let travel: Vec<f64> = (0..n)
         .map(|i| {
             let part = &q[i.saturating_sub(k)..(i + k + 1).min(n)];

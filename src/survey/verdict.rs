@@ -19,6 +19,34 @@ pub(super) struct Verdict {
     pub joint: Vec<bool>,
     /// whether the turned sign does not, either
     pub sign: Vec<bool>,
+    /// whether all hypotheses that come near give a column of torques to the same joint
+    pub torque: Vec<bool>,
+}
+
+/// Nats by which a hypothesis may be behind and still be looked at on held-out blocks.
+const NEAR: f64 = 60.0;
+/// Most of them.
+const NEAREST: usize = 48;
+
+/// Hypotheses with any other signs whose score comes near.
+fn turned(problem: &Problem, best: &Hypothesis) -> Vec<Hypothesis> {
+    let mut ws = Workspace::default();
+    let score = problem.score(best, &mut ws);
+    let mut near: Vec<(f64, Hypothesis)> = (1..1usize << best.sign.len())
+        .map(|bits| {
+            let mut h = best.clone();
+            for (j, s) in h.sign.iter_mut().enumerate() {
+                if bits >> j & 1 == 1 {
+                    *s = -*s;
+                }
+            }
+            (problem.score(&h, &mut ws), h)
+        })
+        .filter(|(s, _)| *s > score - NEAR)
+        .collect();
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    near.truncate(NEAREST);
+    near.into_iter().map(|(_, h)| h).collect()
 }
 
 impl Verdict {
@@ -36,13 +64,22 @@ impl Verdict {
             .filter(|h| allowed(h))
             .collect();
         rivals.extend(found.iter().skip(1).map(|(_, h)| h.clone()));
+        // many signs at once: an arm and its mirror image have the same torques
+        rivals.extend(turned(problem, best).into_iter().filter(|h| allowed(h)));
+        let mut ws = Workspace::default();
+        let of = problem.best_joints(best, &mut ws);
         let mut out = Verdict {
             joint: vec![true; n],
             sign: vec![true; n],
+            torque: vec![true; of.len()],
         };
         for rival in rivals {
             if better(problem, best, &rival) {
                 continue;
+            }
+            let other = problem.best_joints(&rival, &mut ws);
+            for (c, same) in out.torque.iter_mut().enumerate() {
+                *same &= other[c] == of[c];
             }
             for j in 0..n {
                 out.joint[j] &= rival.column[j] == best.column[j];

@@ -424,7 +424,7 @@ fn an_experiment_states_its_columns() {
     for (entry, word) in [
         ("from = 1.5\nto = 0.5", "not before"),
         ("from = -1.0", "seconds from"),
-        ("from = 50.0", "2"),
+        ("from = 50.0", "lie between"),
         ("form = \"csv\"", "form"),
         ("format = \"xls\"", "xls"),
     ] {

@@ -249,7 +249,6 @@ fn what_is_no_log_is_an_error_with_its_place() {
     assert!(e.contains("tau2") && e.contains("not recorded"), "{e}");
     for (header, word) in [
         ("t,q1,q2,q3,tau1,tau2,tau3", "2 actuated joints"),
-        ("t,q0,q1,tau0,tau1", "counted from 1"),
         ("t,q1,tau1,tau2", "not q2"),
         ("t,q1,q2", "no columns tau1"),
         ("t,q1,q1,tau1,tau2", "not q2"),

@@ -284,34 +284,30 @@ fn names(
             d => line.split(|b| *b == d).map(text).collect(),
         }
     };
-    let before = lines[..first]
-        .iter()
-        .rev()
-        .find(|l| !l.trim_ascii().is_empty());
-    let Some(line) = before else {
+    // the nearest line above that can be names; a comment only if it has as many words as there are columns
+    let mut found = Vec::new();
+    for line in lines[..first].iter().rev() {
+        let line = line.trim_ascii();
+        if line.is_empty() {
+            continue;
+        }
+        if !idle(line) {
+            found = plain(line, delimiter);
+            break;
+        }
+        let marks = line.iter().take_while(|c| matches!(c, b'#' | b'%' | b'/'));
+        let body = line[marks.count()..].trim_ascii();
+        let fits = [delimiter, b',', b' ', b';', b'\t']
+            .into_iter()
+            .map(|d| plain(body, d))
+            .find(|c| c.len() == n && n > 1);
+        if let Some(fits) = fits {
+            found = fits;
+            break;
+        }
+    }
+    if found.is_empty() {
         return numbered();
-    };
-    let comment = idle(line);
-    let body = match comment {
-        true => {
-            let b = line.trim_ascii_start();
-            &b[b.iter()
-                .take_while(|c| matches!(c, b'#' | b'%' | b'/'))
-                .count()..]
-        }
-        false => line,
-    };
-    let mut found = plain(body, delimiter);
-    if comment && found.len() != n {
-        for other in [b',', b' ', b';', b'\t'] {
-            let again = plain(body.trim_ascii(), other);
-            if again.len() == n {
-                found = again;
-            }
-        }
-        if found.len() != n {
-            return numbered();
-        }
     }
     // a comma at the end of each line makes a column without name
     while found.len() > n && found.last().is_some_and(String::is_empty) {

@@ -86,6 +86,10 @@ fn own(paths: &[PathBuf], reading: &Reading) -> Result<bool> {
             .iter()
             .any(|n| numbered(n).is_some_and(|(group, _)| group == what))
     };
+    // counted from 0 by somebody else
+    if names.iter().any(|n| matches!(numbered(n), Some((_, 0)))) {
+        return Ok(false);
+    }
     Ok(names.iter().any(|n| n == "t") && (ours("q") || ours("tau")))
 }
 
