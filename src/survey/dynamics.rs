@@ -2,7 +2,7 @@
 
 use super::claim::{Claim, Means};
 use super::families::{blocks, families};
-use super::frame::Frame;
+use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
 use super::search::{Hypothesis, Match, Problem, Signals};
 use super::units::{extent, fits};
@@ -51,7 +51,7 @@ fn look(
     starts: usize,
     warnings: &mut Vec<Warning>,
 ) {
-    let Some(frame) = frames.iter().max_by_key(|f| f.len()) else {
+    let Some(frame) = richest(frames) else {
         return;
     };
     let n = plant.actuators().len();

@@ -256,6 +256,28 @@ impl Frame {
     }
 }
 
+/// The record in which the columns change most, each measured by its largest range in any record.
+pub(super) fn richest(frames: &[Frame]) -> Option<&Frame> {
+    let width = |f: &Frame, k: usize| {
+        let values = f.columns.get(k).into_iter().flatten();
+        let [a, b] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
+            [a.min(x), b.max(x)]
+        });
+        (b - a).max(0.0)
+    };
+    let columns = frames.first()?.columns.len();
+    let most: Vec<f64> = (0..columns)
+        .map(|k| frames.iter().map(|f| width(f, k)).fold(0.0, f64::max))
+        .collect();
+    let worth = |f: &Frame| -> f64 {
+        (0..columns)
+            .filter(|&k| Some(k) != f.time && most[k] > 0.0)
+            .map(|k| width(f, k) / most[k])
+            .sum()
+    };
+    frames.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))
+}
+
 /// Whether a joint moves, sample by sample: by more than a hundredth of its usual speed, and by more than the steps of
 /// its encoder.
 fn still_aware(q: &[f64], step: f64) -> Vec<bool> {

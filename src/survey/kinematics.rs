@@ -6,7 +6,7 @@
 //! the delay.
 
 use super::claim::{Claim, Means};
-use super::frame::Frame;
+use super::frame::{Frame, richest};
 use crate::error::{Warning, WarningKind};
 use crate::signals::Butterworth;
 use crate::signals::butterworth::first_derivative;
@@ -155,14 +155,14 @@ pub(super) fn unit_factor(k: f64) -> Option<(f64, &'static str)> {
     .find(|(f, _)| (k.abs() / f - 1.0).abs() < 0.05)
 }
 
-/// Tests named pairs and finds unnamed ones, in the longest record.
+/// Tests named pairs and finds unnamed ones, in the record with most motion.
 pub(super) fn examine(
     frames: &[Frame],
     claims: &mut [Claim],
     robot: bool,
     warnings: &mut Vec<Warning>,
 ) {
-    let Some(frame) = frames.iter().max_by_key(|f| f.len()) else {
+    let Some(frame) = richest(frames) else {
         return;
     };
     let smooth = Smooth::new(frame, 15.0);
