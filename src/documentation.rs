@@ -8,6 +8,7 @@
 //! | [`parallel`] | parallel robots |
 //! | [`identification`] | from a log to a model |
 //! | [`calibration`] | the geometry of a robot, from a camera, a tracker or a ball in sockets |
+//! | [`logs`] | logs of any format, and what their columns mean |
 //! | [`load`] | mass, centre of mass and inertia of a load |
 //! | [`collisions`] | what a motion must not touch, how it keeps clear, and how that is proven |
 //! | [`moves`] | the way to the start of a motion and back; a motion at several speeds |
@@ -38,6 +39,7 @@ macro_rules! documents {
             #[doc = "[identification.md]: crate::documentation::identification"]
             #[doc = "[limits.md]: crate::documentation::limits"]
             #[doc = "[load.md]: crate::documentation::load"]
+            #[doc = "[logs.md]: crate::documentation::logs"]
             #[doc = "[method.md]: crate::documentation::method"]
             #[doc = "[moves.md]: crate::documentation::moves"]
             #[doc = "[notation.md]: crate::documentation::notation"]
@@ -66,6 +68,7 @@ documents! {
     identification "identification"
     limits "limits"
     load "load"
+    logs "logs"
     method "method"
     moves "moves"
     notation "notation"

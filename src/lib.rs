@@ -95,6 +95,8 @@ pub mod signals;
 pub mod simulate;
 #[doc(hidden)]
 pub mod solid;
+#[doc(hidden)]
+pub mod survey;
 pub mod trajectory;
 
 pub use error::{Error, Result, Warning, WarningKind};

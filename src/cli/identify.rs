@@ -69,7 +69,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let mut experiment = Experiment::read(&args.experiment)?;
-    let mut notes = Vec::new();
+    let mut notes = excite::survey::check(&experiment.plant, &experiment.records)?;
     experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
     let mut settings = Settings {
         method: match args.method.as_str() {

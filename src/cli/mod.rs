@@ -8,6 +8,7 @@ mod export;
 mod identifiability;
 mod identify;
 mod load;
+mod log;
 mod moves;
 mod new;
 mod poses;
@@ -52,6 +53,7 @@ enum Command {
     Load(load::Args),
     Poses(poses::Args),
     Calibrate(calibrate::Args),
+    Log(log::Args),
     Robots(robots::Args),
     New(new::Args),
 }
@@ -72,6 +74,7 @@ pub fn main() -> ExitCode {
         Command::Load(a) => load::run(a),
         Command::Poses(a) => poses::run(a),
         Command::Calibrate(a) => calibrate::run(a),
+        Command::Log(a) => log::run(a),
         Command::Robots(a) => robots::run(a),
         Command::New(a) => new::run(a),
     };

@@ -45,7 +45,7 @@ const CLOSED: f64 = 10.0;
 const LARGEST: f64 = 1e21;
 
 /// Median of numbers (of a copy, by selection).
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut v: Vec<f64> = values.filter(|x| x.is_finite()).collect();
     if v.is_empty() {
         return f64::NAN;

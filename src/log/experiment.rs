@@ -1,5 +1,8 @@
 //! `experiment.toml`.
 
+use super::formats::Format;
+use super::layout::Layout;
+use super::record::Reading;
 use super::{Payload, Purpose, Record};
 use crate::error::{Error, Result, Warning};
 use crate::plant::Plant;
@@ -32,11 +35,24 @@ struct File {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
-    log: String,
+    log: Logs,
     #[serde(rename = "use")]
     purpose: Purpose,
     period: Option<f64>,
     payload: Option<PayloadEntry>,
+    from: Option<f64>,
+    to: Option<f64>,
+    format: Option<Format>,
+    topic: Option<String>,
+    columns: Option<toml::Table>,
+}
+
+/// One file, or several with a quantity each.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Logs {
+    One(String),
+    Several(Vec<String>),
 }
 
 #[derive(Deserialize)]
@@ -73,6 +89,12 @@ impl Experiment {
             let at = e.span().map_or(String::new(), |s| place(s.start));
             let message = e.message().trim().replace('\n', "; ");
             let message = match message.contains("untagged") {
+                true if text[e.span().map_or(0..0, |s| s)]
+                    .trim_start()
+                    .starts_with("log") =>
+                {
+                    "log is a file, or a list of files with a quantity each".into()
+                }
                 true => {
                     "payload is \"none\", \"unknown\" or { mass = 2.0, com = [0, 0, 0.05] }".into()
                 }
@@ -111,16 +133,20 @@ impl Experiment {
                 let message = format!("period is {p}; it must be positive, in seconds");
                 return Err(Error::file(path, place, message));
             }
-            let payload = entry
-                .payload()
-                .map_err(|message| Error::file(path, place, message))?;
-            entries.push((entry, payload));
+            let fail = |message| Error::file(path, place.clone(), message);
+            let payload = entry.payload().map_err(fail)?;
+            let reading = entry.reading().map_err(fail)?;
+            entries.push((entry, payload, reading));
         }
         let records = entries
             .par_iter()
-            .map(|(entry, payload)| {
-                let log = folder.join(&entry.log);
-                let mut record = Record::read(&log, &plant, entry.purpose, entry.period)?;
+            .map(|(entry, payload, reading)| {
+                let logs: Vec<PathBuf> = match &entry.log {
+                    Logs::One(log) => vec![folder.join(log)],
+                    Logs::Several(logs) => logs.iter().map(|l| folder.join(l)).collect(),
+                };
+                let mut record =
+                    Record::read_as(&logs, &plant, entry.purpose, entry.period, reading)?;
                 record.payload = *payload;
                 Ok(record)
             })
@@ -146,6 +172,32 @@ impl Experiment {
 }
 
 impl Entry {
+    fn reading(&self) -> Result<Reading, String> {
+        for (name, value) in [("from", self.from), ("to", self.to)] {
+            if let Some(x) = value
+                && !(x.is_finite() && x >= 0.0)
+            {
+                return Err(format!(
+                    "{name} is {x}; it is in seconds from the record's start"
+                ));
+            }
+        }
+        if let (Some(from), Some(to)) = (self.from, self.to)
+            && from >= to
+        {
+            return Err(format!("from = {from} is not before to = {to}"));
+        }
+        if matches!(&self.log, Logs::Several(list) if list.is_empty()) {
+            return Err("log is an empty list".into());
+        }
+        Ok(Reading {
+            format: self.format,
+            topic: self.topic.clone(),
+            layout: self.columns.as_ref().map(Layout::of_entry).transpose()?,
+            part: [self.from, self.to],
+        })
+    }
+
     fn payload(&self) -> Result<Payload, String> {
         let Some(payload) = &self.payload else {
             return Ok(Payload::None);

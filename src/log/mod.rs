@@ -18,10 +18,15 @@
 pub(crate) mod channels;
 pub(crate) mod clock;
 mod experiment;
+pub(crate) mod formats;
+pub(crate) mod layout;
+pub(crate) mod merge;
+pub(crate) mod names;
 pub(crate) mod number;
-mod record;
+pub(crate) mod record;
 pub(crate) mod resample;
 pub(crate) mod table;
+mod unit;
 mod written;
 
 pub use experiment::Experiment;

@@ -1,6 +1,11 @@
 //! A log of a robot: which column is what, repaired and put on an even time grid.
 
 mod checks;
+mod cut;
+mod reading;
+
+pub(crate) use cut::impossible;
+pub(crate) use reading::Reading;
 
 use super::clock::{self, Clock};
 use super::resample::{Order, interpolate};
@@ -139,13 +144,8 @@ impl Record {
         purpose: Purpose,
         period: Option<f64>,
     ) -> Result<Record> {
-        let path = path.as_ref();
-        let known = |name: &str| name == "t" || POSE.contains(&name) || numbered(name).is_some();
-        let joints = plant.actuators();
-        let check = |table: &Table| check_names(table, &joints, path);
-        let (mut table, unknown) = Table::read_checked(path, &known, &check)?;
-        table.warnings.extend(unknown);
-        Self::of_table(table, path, plant, purpose, period)
+        let paths = [path.as_ref().to_path_buf()];
+        Self::read_as(&paths, plant, purpose, period, &Reading::default())
     }
 
     /// A record from the columns of a log.
@@ -155,6 +155,7 @@ impl Record {
         plant: &Plant,
         purpose: Purpose,
         period: Option<f64>,
+        part: [Option<f64>; 2],
     ) -> Result<Record> {
         let joints = plant.actuators();
         let n = joints.len();
@@ -162,7 +163,7 @@ impl Record {
         let subject = path.display().to_string();
 
         let at = table.find("t").unwrap_or(0);
-        let clock = clock::repair(&table.columns[at], &subject);
+        let clock = clock::repair(&table.columns[at], &subject).between(part, path)?;
         warnings.extend(clock.warnings.iter().cloned());
         if clock.t.len() < 8 {
             let message = match table.rows() >= 8 {
@@ -217,6 +218,7 @@ impl Record {
         });
         drop(table);
 
+        record.drop_impossible(clock.keep.as_deref());
         record.fill_dropped(&clock)?;
         record.check_channels(&joints)?;
         let duration = clock.t[clock.t.len() - 1] - clock.t[0];

@@ -78,7 +78,7 @@ impl Record {
         }
         let path = Path::new(name);
         table.warnings = check_names(&table, &plant.actuators(), path)?;
-        let mut record = Self::of_table(table, path, plant, purpose, period)?;
+        let mut record = Self::of_table(table, path, plant, purpose, period, [None; 2])?;
         record.name = name.into();
         Ok(record)
     }

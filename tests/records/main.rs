@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod formats;
 mod log;
 mod signals;
 mod simulate;
+mod survey;

@@ -1,0 +1,377 @@
+//! Text in cells as columns of numbers.
+//!
+//! The file is read in blocks; each block is cut at line ends into pieces that are parsed on all
+//! threads, straight into columns. In memory are the columns and one block, whatever the size of the
+//! file. Lines that are no rows are left out and named.
+
+use super::dialect::{Cell, Dialect, canonical, idle, stamp};
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::log::{Table, number};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::io::Read;
+use std::path::Path;
+
+/// Bytes of one block.
+const BLOCK: usize = 8 << 20;
+/// Bytes of the piece that one thread parses.
+const PIECE: usize = 256 << 10;
+/// Longest line; a longer one is not a table of numbers.
+const LINE: usize = 1 << 20;
+/// Bad lines that are kept with their reasons.
+const NAMED: usize = 3;
+
+/// What is wrong with a line: its number within the piece, and why.
+struct Bad {
+    line: usize,
+    message: String,
+}
+
+/// Columns of one piece and its lines.
+struct Piece {
+    columns: Vec<Vec<f64>>,
+    lines: usize,
+    /// the first bad lines
+    bad: Vec<Bad>,
+    /// number of bad lines
+    count: usize,
+    /// whether the last line is one of them
+    last: bool,
+}
+
+/// Lines that are no rows.
+#[derive(Default)]
+struct Left {
+    count: usize,
+    first: Vec<String>,
+}
+
+/// A text without the mark of its byte order.
+pub(super) fn strip(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
+/// Reads a file; columns for which `wanted` is false are not kept (their column is empty). `check`
+/// looks at the names before any line is read, and what it returns is handed on.
+pub(crate) fn read<T>(
+    path: &Path,
+    wanted: &dyn Fn(&str) -> bool,
+    check: &dyn Fn(&Table) -> Result<T>,
+) -> Result<(Table, T)> {
+    let mut checked = None;
+    let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+    let size = file.metadata().map_or(0, |m| m.len());
+    let mut block = vec![0u8; BLOCK.min(size as usize + 1).max(64 << 10)];
+    let mut filled = 0;
+    let mut table = Table::default();
+    let mut layout: Option<(Dialect, Vec<bool>)> = None;
+    let mut left = Left::default();
+    let mut line = 0;
+    loop {
+        let got = file
+            .read(&mut block[filled..])
+            .map_err(|e| Error::io(path, e))?;
+        filled += got;
+        let end = got == 0;
+        if !end && filled < block.len() {
+            continue;
+        }
+        // up to the last line end; at the end of the file everything
+        let whole = match end {
+            true => filled,
+            false => match block[..filled].iter().rposition(|&b| b == b'\n') {
+                Some(at) => at + 1,
+                None if filled > LINE => {
+                    let message = "a line of more than a megabyte: this is not a CSV log";
+                    return Err(Error::file(path, format!("line {}", line + 1), message));
+                }
+                None => {
+                    block.resize(2 * filled, 0);
+                    continue;
+                }
+            },
+        };
+        let mut text = &block[..whole];
+        if layout.is_none() {
+            let dialect = Dialect::of(text).ok_or_else(|| no_numbers(path, text))?;
+            text = strip(text);
+            let each = text.iter().take(LINE).position(|b| *b == b'\n');
+            for _ in 0..dialect.head {
+                let at = text.iter().position(|b| *b == b'\n');
+                text = at.map_or(&[], |at| &text[at + 1..]);
+            }
+            line = dialect.head;
+            let keep: Vec<bool> = (0..dialect.names.len())
+                .map(|k| dialect.cells[k] != Cell::Text && wanted(&dialect.names[k]))
+                .collect();
+            let rows = (size as usize / each.unwrap_or(80).max(8)).min(1 << 24);
+            table.names = dialect.names.clone();
+            table.columns = vec![Vec::new(); table.names.len()];
+            for (column, keep) in table.columns.iter_mut().zip(&keep) {
+                column.reserve(if *keep { rows / 2 } else { 0 });
+            }
+            checked = Some(check(&table)?);
+            layout = Some((dialect, keep));
+        }
+        if let Some((dialect, keep)) = &layout {
+            let cut_off = end && !text.is_empty() && text.last() != Some(&b'\n');
+            let text: Cow<[u8]> = match dialect.plain {
+                true => Cow::Borrowed(text),
+                false => {
+                    let parts: Vec<Vec<u8>> = cut(text)
+                        .into_par_iter()
+                        .map(|p| {
+                            let mut out = Vec::with_capacity(p.len());
+                            canonical(p, dialect.delimiter, dialect.comma, &mut out);
+                            out
+                        })
+                        .collect();
+                    Cow::Owned(parts.concat())
+                }
+            };
+            append(
+                &mut table, &text, dialect, keep, &mut line, cut_off, &mut left, path,
+            );
+        }
+        block.copy_within(whole..filled, 0);
+        filled -= whole;
+        if end {
+            break;
+        }
+    }
+    let rows = table.rows();
+    let (Some(checked), Some((dialect, keep))) = (checked, layout) else {
+        return Err(no_numbers(path, &[]));
+    };
+    if left.count > 0 {
+        let first = left.first.join("; ");
+        if left.count > rows {
+            let message = format!(
+                "{} of {} lines are no rows of {} cells: {first}",
+                left.count,
+                left.count + rows,
+                table.names.len()
+            );
+            return Err(Error::file(path, "", message));
+        }
+        let more = match left.count > left.first.len() {
+            true => "; …",
+            false => "",
+        };
+        table.warnings.push(Warning::new(
+            WarningKind::RowsLeftOut,
+            path.display().to_string(),
+            format!(
+                "{} lines are no rows and were left out: {first}{more}",
+                left.count
+            ),
+        ));
+    }
+    if rows == 0 && keep.contains(&true) {
+        return Err(no_numbers(path, &[]));
+    }
+    // a column of texts can be neither a time nor a measurement
+    let texts: Vec<usize> = (0..table.names.len())
+        .filter(|&k| dialect.cells[k] == Cell::Text)
+        .collect();
+    for k in texts.into_iter().rev() {
+        table.names.remove(k);
+        table.columns.remove(k);
+    }
+    Ok((table, checked))
+}
+
+fn no_numbers(path: &Path, text: &[u8]) -> Error {
+    let message = match text.is_empty() || text.trim_ascii().is_empty() {
+        true => "it is empty, or has a header and no samples under it; was the recording stopped?",
+        false => "it has a header and no samples under it, or no line of numbers at all",
+    };
+    Error::file(path, "", message)
+}
+
+/// Parses whole lines and appends them.
+#[allow(clippy::too_many_arguments)]
+fn append(
+    table: &mut Table,
+    text: &[u8],
+    dialect: &Dialect,
+    keep: &[bool],
+    line: &mut usize,
+    cut_off: bool,
+    left: &mut Left,
+    path: &Path,
+) {
+    let delimiter = if dialect.plain {
+        dialect.delimiter
+    } else {
+        b','
+    };
+    let pieces: Vec<Piece> = cut(text)
+        .into_par_iter()
+        .map(|p| piece(p, delimiter, &dialect.cells, keep))
+        .collect();
+    let end = pieces.len().wrapping_sub(1);
+    for (k, mut p) in pieces.into_iter().enumerate() {
+        for (column, more) in table.columns.iter_mut().zip(p.columns) {
+            column.extend_from_slice(&more);
+        }
+        // a recording that was cut in the middle of its last line
+        if cut_off && k == end && p.last {
+            p.count -= 1;
+            p.bad.retain(|b| b.line != p.lines);
+            table.warnings.push(Warning::new(
+                WarningKind::RowsLeftOut,
+                path.display().to_string(),
+                format!(
+                    "line {} breaks off at the end of the file; it was left out",
+                    *line + p.lines
+                ),
+            ));
+        }
+        left.count += p.count;
+        for bad in p.bad {
+            if left.first.len() < NAMED {
+                let message = explain(&bad.message, &dialect.names);
+                left.first
+                    .push(format!("line {}: {message}", *line + bad.line));
+            }
+        }
+        *line += p.lines;
+    }
+}
+
+/// Puts the name for the `{k}` of a message.
+fn explain(message: &str, names: &[String]) -> String {
+    match message.split_once('{').and_then(|(before, rest)| {
+        let (k, after) = rest.split_once('}')?;
+        let name = names.get(k.parse::<usize>().ok()?)?;
+        Some(format!("{before}{name}{after}"))
+    }) {
+        Some(text) => text,
+        None => message.to_string(),
+    }
+}
+
+/// Cuts a text at line ends into pieces.
+fn cut(text: &[u8]) -> Vec<&[u8]> {
+    let mut pieces = Vec::with_capacity(text.len() / PIECE + 1);
+    let mut rest = text;
+    while rest.len() > PIECE {
+        let end = rest[PIECE..]
+            .iter()
+            .position(|&b| b == b'\n')
+            .map_or(rest.len(), |at| PIECE + at + 1);
+        pieces.push(&rest[..end]);
+        rest = &rest[end..];
+    }
+    if !rest.is_empty() {
+        pieces.push(rest);
+    }
+    pieces
+}
+
+/// Parses the lines of one piece.
+fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
+    let n = keep.len();
+    let mut out = Piece {
+        columns: vec![Vec::new(); n],
+        lines: 0,
+        bad: Vec::new(),
+        count: 0,
+        last: false,
+    };
+    let first = text.iter().position(|&b| b == b'\n').unwrap_or(text.len());
+    let rows = text.len() / first.max(8) + 16;
+    for (column, keep) in out.columns.iter_mut().zip(keep) {
+        column.reserve(if *keep { rows } else { 0 });
+    }
+    let mut row = vec![0.0; n];
+    let mut at = 0;
+    while at < text.len() {
+        out.lines += 1;
+        out.last = false;
+        if matches!(text[at], b'\n' | b'\r' | b'#' | b'%' | b'/' | b' ') {
+            let end = text[at..]
+                .iter()
+                .position(|b| *b == b'\n')
+                .map_or(text.len(), |k| at + k);
+            if idle(&text[at..end]) {
+                at = end + 1;
+                continue;
+            }
+        }
+        let mut k = 0;
+        let mut wrong = None;
+        loop {
+            let start = at;
+            while at < text.len() && text[at] != delimiter && text[at] != b'\n' {
+                at += 1;
+            }
+            let line_end = at >= text.len() || text[at] == b'\n';
+            let mut cell = &text[start..at];
+            if line_end && cell.last() == Some(&b'\r') {
+                cell = &cell[..cell.len() - 1];
+            }
+            at += 1;
+            if k < n && keep[k] {
+                let value = match cells[k] {
+                    Cell::Number => number::parse(cell),
+                    _ => stamp(cell).or(cell.trim_ascii().is_empty().then_some(f64::NAN)),
+                };
+                match value {
+                    Some(x) => row[k] = x,
+                    None if wrong.is_none() => {
+                        let shown: String = String::from_utf8_lossy(cell)
+                            .chars()
+                            .filter(|c| !c.is_control())
+                            .take(40)
+                            .collect();
+                        wrong = Some(format!("column {{{k}}}: `{shown}` is not a number"));
+                    }
+                    None => {}
+                }
+            }
+            k += 1;
+            if line_end {
+                break;
+            }
+        }
+        // a delimiter behind the last cell of every line is no cell
+        if k != n
+            && !(k == n + 1
+                && text[..at.min(text.len())].trim_ascii_end().last() == Some(&delimiter))
+        {
+            wrong = Some(format!("it has {k} cells instead of {n}"));
+        }
+        if let Some(message) = wrong {
+            out.count += 1;
+            out.last = true;
+            if out.bad.len() < NAMED || at >= text.len() {
+                out.bad.push(Bad {
+                    line: out.lines,
+                    message,
+                });
+            }
+            continue;
+        }
+        for k in 0..n {
+            if keep[k] {
+                out.columns[k].push(row[k]);
+            }
+        }
+    }
+    out
+}
+
+/// The names of the columns.
+pub(crate) fn names(path: &Path) -> Result<Vec<String>> {
+    let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+    let mut text = Vec::new();
+    file.take(256 << 10)
+        .read_to_end(&mut text)
+        .map_err(|e| Error::io(path, e))?;
+    match Dialect::of(&text) {
+        Some(dialect) => Ok(dialect.names),
+        None => Err(no_numbers(path, &text)),
+    }
+}

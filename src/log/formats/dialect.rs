@@ -1,0 +1,386 @@
+//! How a text file of cells is laid out, found out from its first lines: delimiter, decimal comma, names,
+//! lists in cells, columns of texts and of stamps.
+
+use super::csv::strip;
+use crate::log::number;
+
+/// Lines that are looked at.
+const LINES: usize = 200;
+
+/// What stands in a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Cell {
+    /// numbers
+    Number,
+    /// a date or a time of day
+    Stamp,
+    /// anything else
+    Text,
+}
+
+/// Layout of a file.
+#[derive(Debug, Clone)]
+pub(crate) struct Dialect {
+    /// between cells; a space stands for any run of blanks
+    pub delimiter: u8,
+    /// whether numbers have a comma for a point
+    pub comma: bool,
+    /// whether lines are plain cells that can be parsed as they stand
+    pub plain: bool,
+    /// names of the columns, or their numbers from 1
+    pub names: Vec<String>,
+    /// what the columns hold
+    pub cells: Vec<Cell>,
+    /// lines before the first of numbers
+    pub head: usize,
+    /// whether the names stand in the file
+    #[allow(dead_code)]
+    pub named: bool,
+}
+
+/// Whether a line has nothing to read.
+pub(super) fn idle(line: &[u8]) -> bool {
+    let line = line.trim_ascii();
+    line.is_empty() || matches!(line[0], b'#' | b'%') || line.starts_with(b"//")
+}
+
+/// The cells of a line in canonical form, see [`canonical`].
+fn cells(line: &[u8], delimiter: u8, comma: bool) -> Vec<Vec<u8>> {
+    let mut out = Vec::new();
+    canonical(line, delimiter, comma, &mut out);
+    out.split(|b| *b == b',').map(<[u8]>::to_vec).collect()
+}
+
+/// Appends a text with its cells separated by commas and decimal points in numbers: quotes and brackets
+/// taken away, lists laid open to cells of their own, runs of blanks as one separator where blanks separate.
+pub(super) fn canonical(text: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u8>) {
+    for line in text.split_inclusive(|b| *b == b'\n') {
+        let (body, end) = match line.strip_suffix(b"\n") {
+            Some(body) => (body.strip_suffix(b"\r").unwrap_or(body), &b"\n"[..]),
+            None => (line, &b""[..]),
+        };
+        if idle(body) {
+            out.extend(end);
+            continue;
+        }
+        let body = body.trim_ascii_end();
+        let body = if delimiter == b' ' {
+            body.trim_ascii_start()
+        } else {
+            body
+        };
+        let (mut depth, mut quoted) = (0u32, None);
+        // whether a separator is due before the next character
+        let mut due = false;
+        let mut empty_list = false;
+        for &c in body {
+            match c {
+                b'"' | b'\'' if quoted == Some(c) => quoted = None,
+                b'"' | b'\'' if quoted.is_none() => quoted = Some(c),
+                b'[' | b'('
+                    if quoted.is_some()
+                        || depth > 0
+                        || matches!(last(out), None | Some(b',' | b'\n'))
+                        || due
+                        || out.last() == Some(&b' ') =>
+                {
+                    depth += 1;
+                    empty_list = true;
+                }
+                b']' | b')' if depth > 0 => {
+                    depth -= 1;
+                    due = false;
+                }
+                b',' | b';' | b' ' | b'\t' if depth > 0 => due = !empty_list,
+                _ if depth == 0
+                    && quoted.is_none()
+                    && (c == delimiter || delimiter == b' ' && c == b'\t') =>
+                {
+                    match delimiter {
+                        b' ' => due = true,
+                        _ => out.push(b','),
+                    }
+                }
+                b',' if quoted.is_some() && !comma => out.push(b' '),
+                _ => {
+                    if due {
+                        out.push(b',');
+                        due = false;
+                    }
+                    empty_list = false;
+                    out.push(match c {
+                        b',' if comma => b'.',
+                        b',' => b' ',
+                        other => other,
+                    });
+                }
+            }
+        }
+        out.extend(end);
+    }
+}
+
+fn last(out: &[u8]) -> Option<u8> {
+    out.iter().rev().find(|b| **b != b' ').copied()
+}
+
+/// A date, a time of day, or both, in seconds.
+pub(crate) fn stamp(cell: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(cell).ok()?.trim().trim_matches('"');
+    let (date, time) = match text.split_once(['T', ' ']) {
+        Some((d, t)) => (Some(d), t.trim()),
+        None => (None, text),
+    };
+    let days = match date {
+        None => 0.0,
+        Some(d) => {
+            let mut parts = d.split(['-', '/']).map(|p| p.parse::<i64>().ok());
+            let (y, m, d) = (parts.next()??, parts.next()??, parts.next()??);
+            if !(1..=12).contains(&m) || !(1..=31).contains(&d) || !(1900..3000).contains(&y) {
+                return None;
+            }
+            // days of the civil calendar since 1970 (proleptic Gregorian)
+            let (y, m) = if m > 2 { (y, m - 3) } else { (y - 1, m + 9) };
+            (365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + d - 1 - 719_468) as f64
+        }
+    };
+    let time = time.trim_end_matches('Z').trim();
+    let time = time.split('+').next()?;
+    let mut parts = time.split(':');
+    let (h, m): (f64, f64) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
+    let s: f64 = parts
+        .next()
+        .map_or(Ok(0.0), |s| s.replace(',', ".").parse())
+        .ok()?;
+    (parts.next().is_none() && h < 48.0 && m < 60.0 && s < 61.0)
+        .then_some(days * 86400.0 + h * 3600.0 + m * 60.0 + s)
+}
+
+impl Dialect {
+    /// The dialect of a file that begins with `text`; `None` where it has no line of numbers.
+    pub fn of(text: &[u8]) -> Option<Self> {
+        let text = strip(text);
+        let lines: Vec<&[u8]> = text
+            .split(|b| *b == b'\n')
+            .map(|l| l.strip_suffix(b"\r").unwrap_or(l))
+            .take(LINES)
+            .collect();
+        let whole = match text.iter().filter(|b| **b == b'\n').take(LINES).count() {
+            // the last line may be cut by the end of the block
+            n if n + 1 == lines.len() && n > 1 => &lines[..n],
+            _ => &lines[..],
+        };
+        let mut best: Option<(f64, Self)> = None;
+        for (delimiter, comma) in [
+            (b',', false),
+            (b';', false),
+            (b'\t', false),
+            (b'|', false),
+            (b' ', false),
+            (b';', true),
+            (b'\t', true),
+            (b' ', true),
+        ] {
+            if let Some((score, dialect)) = Self::with(whole, delimiter, comma)
+                && best.as_ref().is_none_or(|(s, _)| score > *s)
+            {
+                best = Some((score, dialect));
+            }
+        }
+        best.map(|(_, d)| d)
+    }
+
+    /// How well this layout fits: the share of cells that are numbers, in lines of the usual count.
+    fn with(lines: &[&[u8]], delimiter: u8, comma: bool) -> Option<(f64, Self)> {
+        let split: Vec<(usize, Vec<Vec<u8>>)> = lines
+            .iter()
+            .enumerate()
+            .filter(|(_, l)| !idle(l))
+            .map(|(i, l)| (i, cells(l, delimiter, comma)))
+            .collect();
+        let number = |c: &Vec<u8>| !c.trim_ascii().is_empty() && number::parse(c).is_some();
+        let numbers = |row: &[Vec<u8>]| row.iter().filter(|c| number(c)).count();
+        // lines of data: at least a third of their cells are numbers
+        let data = |row: &[Vec<u8>]| 3 * numbers(row) >= row.len();
+        let mut counts: Vec<usize> = split
+            .iter()
+            .filter(|(_, r)| data(r))
+            .map(|(_, r)| r.len())
+            .collect();
+        counts.sort_unstable();
+        let n = *counts
+            .chunk_by(|a, b| a == b)
+            .max_by_key(|c| (c.len(), c[0]))?
+            .first()?;
+        let rows: Vec<&(usize, Vec<Vec<u8>>)> = split
+            .iter()
+            .filter(|(_, r)| r.len() == n && data(r))
+            .collect();
+        let first = rows.first()?.0;
+        let mut kinds = Vec::with_capacity(n);
+        for k in 0..n {
+            let of = |test: &dyn Fn(&[u8]) -> bool| rows.iter().filter(|r| test(&r.1[k])).count();
+            let numbers = of(&|c| number::parse(c).is_some());
+            let stamps = of(&|c| stamp(c).is_some());
+            kinds.push(
+                match (2 * numbers >= rows.len(), 2 * stamps >= rows.len()) {
+                    (true, _) => Cell::Number,
+                    (_, true) => Cell::Stamp,
+                    _ => Cell::Text,
+                },
+            );
+        }
+        let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
+        let full: usize = rows.iter().map(|r| numbers(&r.1)).sum();
+        let cells_seen: usize = split
+            .iter()
+            .filter(|(i, _)| *i >= first)
+            .map(|(_, r)| r.len())
+            .sum();
+        let score = rows.len() as f64 / total as f64 * full as f64 / cells_seen.max(1) as f64
+            * (1.0 - 0.5 / n as f64);
+        let (names, named) = names(lines, &split, first, n, delimiter);
+        let special = |l: &&[u8]| l.iter().any(|b| matches!(b, b'"' | b'\'' | b'[' | b'('));
+        let plain = !comma
+            && delimiter != b' '
+            && !lines.iter().skip(first).any(|l| !idle(l) && special(l));
+        Some((
+            score,
+            Dialect {
+                delimiter,
+                comma,
+                plain,
+                names,
+                cells: kinds,
+                head: first,
+                named,
+            },
+        ))
+    }
+}
+
+/// Names of `n` columns from the line before the first row `first`, be it a comment or not. A list in a
+/// cell stands under one name.
+fn names(
+    lines: &[&[u8]],
+    split: &[(usize, Vec<Vec<u8>>)],
+    first: usize,
+    n: usize,
+    delimiter: u8,
+) -> (Vec<String>, bool) {
+    let text = |c: &[u8]| {
+        let t = String::from_utf8_lossy(c);
+        t.trim().trim_matches(['"', '\'']).trim().to_string()
+    };
+    let numbered = || ((1..=n).map(|k| k.to_string()).collect(), false);
+    // header cells without regard to brackets, which are part of names
+    let plain = |line: &[u8], delimiter: u8| -> Vec<String> {
+        match delimiter {
+            b' ' => line
+                .split(|b| b.is_ascii_whitespace())
+                .filter(|c| !c.is_empty())
+                .map(text)
+                .collect(),
+            d => line.split(|b| *b == d).map(text).collect(),
+        }
+    };
+    // the nearest line above that can be names; a comment only if it has as many words as there are columns
+    let mut found = Vec::new();
+    for line in lines[..first].iter().rev() {
+        let line = line.trim_ascii();
+        if line.is_empty() {
+            continue;
+        }
+        if !idle(line) {
+            found = plain(line, delimiter);
+            break;
+        }
+        let marks = line.iter().take_while(|c| matches!(c, b'#' | b'%' | b'/'));
+        let body = line[marks.count()..].trim_ascii();
+        let fits = [delimiter, b',', b' ', b';', b'\t']
+            .into_iter()
+            .map(|d| plain(body, d))
+            .find(|c| c.len() == n && n > 1);
+        if let Some(fits) = fits {
+            found = fits;
+            break;
+        }
+    }
+    if found.is_empty() {
+        return numbered();
+    }
+    // a comma at the end of each line makes a column without name
+    while found.len() > n && found.last().is_some_and(String::is_empty) {
+        found.pop();
+    }
+    if found.iter().all(|c| c.parse::<f64>().is_ok()) {
+        return numbered();
+    }
+    if found.len() == n {
+        return (unique(found), true);
+    }
+    if found.len() > n {
+        return numbered();
+    }
+    // lists: how many cells each name stands over, from the first row as it is written
+    let Some(row) = split.iter().find(|(i, r)| *i == first && r.len() == n) else {
+        return numbered();
+    };
+    let widths = widths(lines[row.0], delimiter);
+    if widths.len() != found.len() || widths.iter().sum::<usize>() != n {
+        return numbered();
+    }
+    let mut out = Vec::new();
+    for (name, width) in found.iter().zip(widths) {
+        match width {
+            1 => out.push(name.clone()),
+            w => out.extend((0..w).map(|k| format!("{name}[{k}]"))),
+        }
+    }
+    (unique(out), true)
+}
+
+/// Number of cells that each cell of a line becomes when its list is laid open.
+fn widths(line: &[u8], delimiter: u8) -> Vec<usize> {
+    let (mut depth, mut quoted) = (0, false);
+    let mut parts: Vec<Vec<u8>> = vec![Vec::new()];
+    for &c in line {
+        match c {
+            b'"' => quoted = !quoted,
+            b'[' | b'(' => depth += 1,
+            b']' | b')' => depth -= 1,
+            c if c == delimiter && depth == 0 && !quoted => {
+                parts.push(Vec::new());
+                continue;
+            }
+            _ => {}
+        }
+        if let Some(p) = parts.last_mut() {
+            p.push(c);
+        }
+    }
+    parts
+        .iter()
+        .map(|p| cells(p, delimiter, false).len())
+        .collect()
+}
+
+/// Names of which none stands there twice and none is empty.
+fn unique(names: Vec<String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::with_capacity(names.len());
+    for (k, name) in names.into_iter().enumerate() {
+        let name = if name.is_empty() {
+            (k + 1).to_string()
+        } else {
+            name
+        };
+        let mut other = name.clone();
+        let mut n = 2;
+        while out.contains(&other) {
+            other = format!("{name}#{n}");
+            n += 1;
+        }
+        out.push(other);
+    }
+    out
+}

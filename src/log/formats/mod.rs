@@ -1,0 +1,229 @@
+//! Files that logs come in, one file a format: each gives a [`Table`] of named columns.
+//!
+//! | format | file | names of the columns |
+//! |---|---|---|
+//! | CSV of any layout, RTDE, libfranka, Kortex | `csv` | the header's, or numbers from 1; lists in cells as `name[0]` … |
+//! | rosbag2 | `db3`, `mcap` | `position/JOINT`, `velocity/JOINT`, `effort/JOINT`, … (`bag`) |
+//! | NumPy | `npz` | `array`, or `array[0]` … |
+//! | MATLAB 5 to 7.2 | `mat` | `variable`, `struct.field`, or `variable[0]` … |
+
+mod arrays;
+mod bag;
+mod bytes;
+mod cdr;
+pub(crate) mod csv;
+mod db3;
+mod dialect;
+mod mat;
+mod mcap;
+mod npz;
+mod sqlite;
+
+use super::Table;
+use crate::error::{Error, Result};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+/// Format of a log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// text in cells, of any layout
+    Csv,
+    /// rosbag2 in SQLite
+    Db3,
+    /// rosbag2 in MCAP
+    Mcap,
+    /// CSV of the RTDE recorder of Universal Robots
+    Rtde,
+    /// CSV of libfranka's log
+    Libfranka,
+    /// CSV of the feedback of Kinova's Kortex
+    Kortex,
+    /// NumPy arrays, `.npz` or `.npy`
+    Npz,
+    /// MATLAB 5 to 7.2
+    Mat,
+}
+
+impl Format {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Csv => "csv",
+            Format::Db3 => "db3",
+            Format::Mcap => "mcap",
+            Format::Rtde => "rtde",
+            Format::Libfranka => "libfranka",
+            Format::Kortex => "kortex",
+            Format::Npz => "npz",
+            Format::Mat => "mat",
+        }
+    }
+
+    /// Whether it is text in cells.
+    pub fn text(self) -> bool {
+        matches!(
+            self,
+            Format::Csv | Format::Rtde | Format::Libfranka | Format::Kortex
+        )
+    }
+
+    /// The dialect of CSV that these names of columns are of.
+    pub(super) fn of_names(names: &[String]) -> Format {
+        let has = |what: &str| names.iter().any(|n| n.trim().starts_with(what));
+        if has("actual_q_") || has("target_q_") || has("actual_current_") {
+            Format::Rtde
+        } else if has("state.q[") || has("state.tau_J") || has("state.q_d") {
+            Format::Libfranka
+        } else if has("actuators[") || has("actuators_") || has("actuators.") {
+            Format::Kortex
+        } else {
+            Format::Csv
+        }
+    }
+}
+
+/// What is read of a file.
+pub(crate) struct Request<'a> {
+    /// the format that was stated
+    pub format: Option<Format>,
+    /// the topic of a bag that was stated
+    pub topic: Option<&'a str>,
+    /// whether a column of this name is kept
+    pub wanted: &'a dyn Fn(&str) -> bool,
+}
+
+/// A table and what it came from.
+pub(crate) struct Read {
+    /// the columns
+    pub table: Table,
+    /// format of the file
+    pub format: Format,
+    /// the topic of a bag that was read
+    pub topic: Option<String>,
+}
+
+/// Reads a file, or a folder that holds a bag.
+pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
+    let found = detect(path)?;
+    if let Some(stated) = request.format
+        && stated != found
+        && !(stated.text() && found.text())
+    {
+        let message = format!(
+            "format = \"{}\" is stated, but it is a file of format {}",
+            stated.name(),
+            found.name()
+        );
+        return Err(Error::file(path, "", message));
+    }
+    let plain = |table: Table, format| Read {
+        table,
+        format,
+        topic: None,
+    };
+    Ok(match found {
+        Format::Db3 | Format::Mcap => {
+            let mut bag = bag::Collector::new(request.topic);
+            for part in parts(path)? {
+                match detect(&part)? {
+                    Format::Mcap => mcap::read(&part, &mut bag)?,
+                    _ => db3::read(&part, &mut bag)?,
+                }
+            }
+            let (table, topic) = bag.table(path)?;
+            Read {
+                table,
+                format: found,
+                topic: Some(topic),
+            }
+        }
+        Format::Npz => plain(npz::read(path)?, found),
+        Format::Mat => plain(mat::read(path)?, found),
+        _ => {
+            let (table, ()) = csv::read(path, request.wanted, &|_| Ok(()))?;
+            let format = request
+                .format
+                .unwrap_or_else(|| Format::of_names(&table.names));
+            plain(table, format)
+        }
+    })
+}
+
+/// The files of a bag: itself, or those of its folder by name.
+fn parts(path: &Path) -> Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let mut parts = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(|e| Error::io(path, e))? {
+        let file = entry.map_err(|e| Error::io(path, e))?.path();
+        let bag = file
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("db3") || e.eq_ignore_ascii_case("mcap"));
+        if bag && file.is_file() {
+            parts.push(file);
+        }
+    }
+    parts.sort();
+    match parts.is_empty() {
+        false => Ok(parts),
+        true => Err(Error::file(
+            path,
+            "",
+            "it is a folder without a bag (.db3 or .mcap); name a file",
+        )),
+    }
+}
+
+/// The format of a file by its first bytes.
+pub(crate) fn detect(path: &Path) -> Result<Format> {
+    if path.is_dir() {
+        let first = parts(path)?;
+        return detect(first.first().map_or(path, |p| p.as_path()));
+    }
+    let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+    let mut head = [0u8; 132];
+    let mut filled = 0;
+    while filled < head.len() {
+        match file
+            .read(&mut head[filled..])
+            .map_err(|e| Error::io(path, e))?
+        {
+            0 => break,
+            n => filled += n,
+        }
+    }
+    let head = &head[..filled];
+    let refuse = |what: &str| Err(Error::file(path, "", what));
+    if head.starts_with(b"SQLite format 3\0") {
+        return Ok(Format::Db3);
+    }
+    if head.starts_with(b"\x89MCAP0\r\n") {
+        return Ok(Format::Mcap);
+    }
+    if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\x93NUMPY") {
+        return Ok(Format::Npz);
+    }
+    if head.starts_with(b"MATLAB 5.0") || matches!(head.get(126..128), Some(b"IM" | b"MI")) {
+        return Ok(Format::Mat);
+    }
+    if head.starts_with(b"MATLAB 7.3") || head.starts_with(b"\x89HDF") {
+        return refuse("it is HDF5 (MATLAB 7.3), which is not read; save it with -v7");
+    }
+    if head.starts_with(b"#ROSBAG") {
+        return refuse(
+            "it is a bag of ROS 1, which is not read; convert it with `rosbags-convert`",
+        );
+    }
+    if head.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) || head.starts_with(&[0x1f, 0x8b]) {
+        return refuse("the whole file is compressed; unpack it first");
+    }
+    if head.iter().filter(|b| **b == 0).count() > head.len() / 8 {
+        return refuse(
+            "it is a binary file of no known format (known are csv, db3, mcap, npz and mat)",
+        );
+    }
+    Ok(Format::Csv)
+}

@@ -1,0 +1,117 @@
+//! Files that hold a quantity each as one table, on the stamps of the first.
+
+use super::Table;
+use super::formats::{Format, Read};
+use super::layout::{Layout, Time, time_unit};
+use super::resample::{Order, interpolate};
+use crate::error::{Error, Result};
+use std::path::PathBuf;
+
+impl Layout {
+    /// The time by the names of the columns.
+    pub(crate) fn time_of(table: &Table, format: Format) -> Option<Time> {
+        let (k, named) = table.names.iter().enumerate().find_map(|(k, name)| {
+            let named = super::names::named(name, format)?;
+            (named.quantity == super::names::Quantity::Time).then_some((k, named))
+        })?;
+        let factor = named.unit.and_then(super::names::unit).map(|(_, f)| f);
+        Some(Time::Column(super::layout::Place::Number(k + 1), factor))
+    }
+}
+
+/// Number of the column of the time and its factor.
+fn time(table: &Table, format: Format) -> Option<(usize, f64)> {
+    match Layout::time_of(table, format)? {
+        Time::Column(super::layout::Place::Number(k), factor) => {
+            let k = k - 1;
+            Some((k, factor.unwrap_or_else(|| time_unit(&table.columns[k]).0)))
+        }
+        _ => None,
+    }
+}
+
+/// One table of all. Columns that several files have are called `FILE.COLUMN` in all but the first.
+pub(crate) fn merge(parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
+    let mut parts = parts.into_iter();
+    let Some((_, first)) = parts.next() else {
+        return Err(Error::Argument("no log is named".into()));
+    };
+    let (mut table, format) = (first.table, first.format);
+    for (path, part) in parts {
+        let stem = path
+            .file_stem()
+            .map_or(String::new(), |s| s.to_string_lossy().into_owned());
+        let mut more = part.table;
+        let rows = (table.rows(), more.rows());
+        let times = (time(&table, format), time(&more, part.format));
+        let on: Option<(Vec<f64>, Vec<f64>, usize)> = match times {
+            (Some((a, fa)), Some((b, fb))) => {
+                let ta: Vec<f64> = table.columns[a].iter().map(|x| x * fa).collect();
+                let tb: Vec<f64> = more.columns[b].iter().map(|x| x * fb).collect();
+                Some((ta, tb, b))
+            }
+            _ if rows.0 == rows.1 => None,
+            _ => {
+                let message = format!(
+                    "it has {} rows beside {} of the first file, and no column of both was recognised as the time",
+                    rows.1, rows.0
+                );
+                return Err(Error::file(&path, "", message));
+            }
+        };
+        for k in 0..more.names.len() {
+            let column = std::mem::take(&mut more.columns[k]);
+            let values = match &on {
+                Some((_, _, at)) if *at == k => continue,
+                Some((ta, tb, _)) if ta != tb => onto(ta, tb, &column).ok_or_else(|| {
+                    Error::file(
+                        &path,
+                        "",
+                        "its stamps have less than two in common with those of the first file",
+                    )
+                })?,
+                _ => column,
+            };
+            let name = &more.names[k];
+            table.names.push(match table.names.contains(name) {
+                true => format!("{stem}.{name}"),
+                false => name.clone(),
+            });
+            table.columns.push(values);
+        }
+        table.warnings.append(&mut more.warnings);
+    }
+    Ok((table, format))
+}
+
+/// A channel on other stamps; NaN outside of its own.
+fn onto(to: &[f64], t: &[f64], y: &[f64]) -> Option<Vec<f64>> {
+    let mut last = f64::NEG_INFINITY;
+    let good: Vec<usize> = (0..t.len())
+        .filter(|&i| {
+            let ok = t[i].is_finite() && t[i].abs() < 1e21 && t[i] > last && y[i].is_finite();
+            last = if ok { t[i] } else { last };
+            ok
+        })
+        .collect();
+    if good.len() < 2 {
+        return None;
+    }
+    let times: Vec<f64> = good.iter().map(|&i| t[i]).collect();
+    let values: Vec<f64> = good.iter().map(|&i| y[i]).collect();
+    let (begin, end) = (times[0], times[times.len() - 1]);
+    // walked once: the stamps must increase, those that do not stay without a value
+    let mut order: Vec<usize> = (0..to.len()).filter(|&i| to[i].is_finite()).collect();
+    order.sort_by(|a, b| to[*a].total_cmp(&to[*b]));
+    let sorted: Vec<f64> = order.iter().map(|&i| to[i]).collect();
+    let moved = interpolate(&times, &values, &sorted, Order::Linear);
+    let mut out = vec![f64::NAN; to.len()];
+    let mut any = 0;
+    for (k, &i) in order.iter().enumerate() {
+        if (begin..=end).contains(&sorted[k]) {
+            out[i] = moved[k];
+            any += 1;
+        }
+    }
+    (any > 1).then_some(out)
+}

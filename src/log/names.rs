@@ -1,0 +1,444 @@
+//! What the names of columns say: quantity, joint, unit. Names are a statement of whoever recorded; what the
+//! numbers say is looked at elsewhere.
+
+use super::formats::Format;
+pub(crate) use super::unit::unit;
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) enum Quantity {
+    Time,
+    Position,
+    Velocity,
+    Acceleration,
+    Torque,
+    Current,
+    /// link-side positions of a second encoder
+    Link,
+    /// commanded position
+    Command,
+    /// a command that is no position, an error, or something that is known to be no quantity of a joint
+    Other,
+}
+
+impl Quantity {
+    /// The group of columns of our own that it becomes.
+    pub fn group(self) -> Option<&'static str> {
+        Some(match self {
+            Quantity::Position => "q",
+            Quantity::Velocity => "dq",
+            Quantity::Acceleration => "ddq",
+            Quantity::Torque | Quantity::Current => "tau",
+            Quantity::Link => "ql",
+            Quantity::Command => "qref",
+            Quantity::Time | Quantity::Other => return None,
+        })
+    }
+}
+
+/// What a name says.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Named {
+    pub quantity: Quantity,
+    /// name of the joint
+    pub joint: Option<String>,
+    /// number of the joint, from whichever one the recorder counts
+    pub number: Option<usize>,
+    pub unit: Option<&'static str>,
+}
+
+/// Words of a name in small letters; letters and digits are different words.
+fn words(name: &str) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    let mut before = ' ';
+    for c in name.chars() {
+        let new = !c.is_alphanumeric()
+            || before.is_ascii_digit() != c.is_ascii_digit()
+            || (before.is_lowercase() && c.is_uppercase());
+        if c.is_alphanumeric() {
+            match out.last_mut() {
+                Some(last) if !new && before.is_alphanumeric() => last.extend(c.to_lowercase()),
+                _ => out.push(c.to_lowercase().collect()),
+            }
+        }
+        before = c;
+    }
+    out
+}
+
+fn quantity(word: &str) -> Option<Quantity> {
+    Some(match word {
+        "q" | "qs" | "pos" | "posn" | "position" | "positions" | "angle" | "angles" | "qpos"
+        | "qm" | "jpos" | "encoder" | "enc" => Quantity::Position,
+        "dq" | "qd" | "qdot" | "vel" | "velocity" | "velocities" | "speed" | "speeds" | "qvel"
+        | "omega" => Quantity::Velocity,
+        "ddq" | "qdd" | "qddot" | "acc" | "accel" | "acceleration" | "accelerations" | "qacc" => {
+            Quantity::Acceleration
+        }
+        "tau" | "torque" | "torques" | "effort" | "efforts" | "moment" | "trq" | "force"
+        | "eff" => Quantity::Torque,
+        "current" | "currents" | "curr" | "cur" | "amps" => Quantity::Current,
+        "ql" | "qlink" => Quantity::Link,
+        "qref" | "qdes" | "qcmd" => Quantity::Command,
+        _ => return None,
+    })
+}
+
+/// Words of a command.
+fn commands(word: &str) -> bool {
+    matches!(
+        word,
+        "ref"
+            | "reference"
+            | "des"
+            | "desired"
+            | "cmd"
+            | "command"
+            | "commanded"
+            | "target"
+            | "setpoint"
+            | "goal"
+            | "control"
+    )
+}
+
+/// Words of what is no quantity of one joint as measured.
+fn foreign(word: &str) -> bool {
+    matches!(
+        word,
+        "ext"
+            | "external"
+            | "error"
+            | "err"
+            | "tcp"
+            | "temp"
+            | "temperature"
+            | "voltage"
+            | "std"
+            | "hat"
+            | "mode"
+            | "status"
+            | "wrench"
+            | "cartesian"
+            | "tool"
+            | "ee"
+            | "success"
+            | "dtau"
+            | "theta"
+            | "dtheta"
+            | "limit"
+            | "stiffness"
+            | "damping"
+            | "covariance"
+            | "orientation"
+            | "pose"
+            | "twist"
+            | "index"
+            | "id"
+            | "seq"
+    )
+}
+
+/// Words that say nothing of which joint it is.
+fn idle(word: &str) -> bool {
+    matches!(
+        word,
+        "joint"
+            | "joints"
+            | "axis"
+            | "actuator"
+            | "actuators"
+            | "motor"
+            | "motors"
+            | "state"
+            | "states"
+            | "actual"
+            | "measured"
+            | "meas"
+            | "act"
+            | "robot"
+            | "field"
+            | "msg"
+            | "data"
+            | "j"
+            | "feedback"
+            | "fb"
+            | "rad"
+            | "deg"
+            | "nm"
+            | "ma"
+            | "a"
+            | "m"
+            | "n"
+            | "s"
+            | "per"
+            | "as"
+    )
+}
+
+/// Whether a name is one of a time.
+fn time(name: &str) -> Option<Option<&'static str>> {
+    // of a path or of a field of a structure, its last part
+    let last = name.rsplit(['.', '/']).next().unwrap_or(name);
+    let words = words(if last.is_empty() { name } else { last });
+    let known = |w: &str| {
+        matches!(
+            w,
+            "t" | "time"
+                | "timestamp"
+                | "timestamps"
+                | "stamp"
+                | "clock"
+                | "elapsed"
+                | "header"
+                | "s"
+                | "sec"
+                | "secs"
+                | "seconds"
+                | "ms"
+                | "us"
+                | "ns"
+                | "msec"
+                | "usec"
+                | "duration"
+                | "unix"
+                | "date"
+                | "datetime"
+        )
+    };
+    let time = words.iter().any(|w| {
+        matches!(
+            w.as_str(),
+            "t" | "time"
+                | "timestamp"
+                | "timestamps"
+                | "stamp"
+                | "clock"
+                | "elapsed"
+                | "duration"
+                | "date"
+                | "datetime"
+        )
+    });
+    let unit = words.iter().find_map(|w| match w.as_str() {
+        "ms" | "msec" => Some("ms"),
+        "us" | "usec" => Some("us"),
+        "ns" => Some("ns"),
+        "s" | "sec" | "secs" | "seconds" => Some("s"),
+        _ => None,
+    });
+    (time && words.iter().all(|w| known(w))).then_some(unit)
+}
+
+/// What a name says, if anything.
+pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
+    let plain = |quantity, joint, number, unit| {
+        Some(Named {
+            quantity,
+            joint,
+            number,
+            unit,
+        })
+    };
+    // columns of bags: what/joint
+    if matches!(format, Format::Db3 | Format::Mcap)
+        && let Some((what, joint)) = name.split_once('/')
+    {
+        let (part, what) = what.split_once('.').unwrap_or(("", what));
+        let quantity = match (part, quantity(what)?) {
+            ("reference", Quantity::Position) => Quantity::Command,
+            ("reference" | "error", _) => Quantity::Other,
+            (_, quantity) => quantity,
+        };
+        return plain(quantity, Some(joint.into()), None, None);
+    }
+    if let Some(unit) = time(name) {
+        let unit = match format {
+            Format::Libfranka => unit.or(Some("ms")),
+            _ => unit,
+        };
+        return plain(Quantity::Time, None, None, unit);
+    }
+    if format == Format::Csv && matches!(name, "x" | "y" | "z" | "qw" | "qx" | "qy" | "qz") {
+        return plain(Quantity::Other, None, None, None);
+    }
+    let words = words(name);
+    let at = words.iter().position(|w| quantity(w).is_some())?;
+    let mut what = quantity(&words[at])?;
+    let desired = format == Format::Libfranka
+        && (words.get(at + 1).is_some_and(|w| w == "d")
+            || words.get(at + 1).is_some_and(|w| w == "j")
+                && words.get(at + 2).is_some_and(|w| w == "d")
+            || words[0] == "cmd");
+    let commanded = desired || words.iter().any(|w| commands(w));
+    if words.iter().any(|w| foreign(w)) {
+        what = Quantity::Other;
+    } else if commanded {
+        what = match what {
+            Quantity::Position | Quantity::Command => Quantity::Command,
+            _ => Quantity::Other,
+        };
+    } else if words.iter().any(|w| w == "link") && what == Quantity::Position {
+        what = Quantity::Link;
+    }
+    // two measurements of one kind in a name, as in actual_current_as_torque
+    if what == Quantity::Current && words.iter().any(|w| w == "torque") {
+        what = Quantity::Torque;
+    }
+    let number = words.iter().rev().find_map(|w| w.parse::<usize>().ok());
+    let rest: Vec<&str> = words
+        .iter()
+        .map(String::as_str)
+        .filter(|w| {
+            quantity(w).is_none() && !commands(w) && !idle(w) && w.parse::<usize>().is_err()
+        })
+        .collect();
+    let joint = match rest.is_empty() || number.is_some() && format != Format::Csv {
+        true => None,
+        false => Some(name.to_string()),
+    };
+    plain(what, joint, number, unit_of(name, what, format))
+}
+
+/// The unit that stands in a name, in brackets or at its end; of Kortex degrees.
+fn unit_of(name: &str, quantity: Quantity, format: Format) -> Option<&'static str> {
+    let bracket = name
+        .rsplit_once(['[', '('])
+        .and_then(|(_, rest)| unit(rest.trim_end_matches([']', ')'])))
+        .map(|(u, _)| u);
+    let low = name.to_lowercase();
+    let angle = matches!(
+        quantity,
+        Quantity::Position
+            | Quantity::Velocity
+            | Quantity::Acceleration
+            | Quantity::Command
+            | Quantity::Link
+    );
+    let degrees = angle
+        && words(&low)
+            .iter()
+            .any(|w| matches!(w.as_str(), "deg" | "degree" | "degrees"));
+    let milli = quantity == Quantity::Current && words(&low).iter().any(|w| w == "ma");
+    bracket
+        .or(degrees.then_some("deg"))
+        .or(milli.then_some("mA"))
+        .or((format == Format::Kortex && angle).then_some("deg"))
+        .or((quantity == Quantity::Current).then_some("A"))
+}
+
+/// Which of `found` is each joint of `robot`: by equal names, else by the end that they share. `None` for a
+/// joint that none or several fit.
+pub(crate) fn match_joints(found: &[String], robot: &[&str]) -> Vec<Option<usize>> {
+    let all: Vec<Vec<String>> = found.iter().map(|f| words(f)).collect();
+    let scores: Vec<Vec<i64>> = robot
+        .iter()
+        .map(|r| {
+            let own = words(r);
+            all.iter()
+                .map(|f| {
+                    if *f == own {
+                        return i64::MAX;
+                    }
+                    // the name of the joint within that of a column
+                    let inside = !own.is_empty() && f.windows(own.len()).any(|w| w == own);
+                    let same = own
+                        .iter()
+                        .rev()
+                        .zip(f.iter().rev())
+                        .take_while(|(a, b)| a == b)
+                        .count() as i64;
+                    match (inside, same) {
+                        (true, _) => 1000 - f.len() as i64,
+                        (_, 0) => i64::MIN,
+                        _ => 3 * same - own.len() as i64 - f.len() as i64,
+                    }
+                })
+                .collect()
+        })
+        .collect();
+    (0..robot.len())
+        .map(|j| {
+            let best = (0..found.len()).max_by_key(|&k| scores[j][k])?;
+            let score = scores[j][best];
+            let tied = (0..found.len()).filter(|&k| scores[j][k] == score).count() > 1;
+            // and no other joint wants it more
+            let wanted = (0..robot.len()).any(|i| i != j && scores[i][best] >= score);
+            (score > i64::MIN && !tied && !wanted).then_some(best)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn says(name: &str, format: Format) -> Option<(Quantity, Option<usize>)> {
+        named(name, format).map(|n| (n.quantity, n.number))
+    }
+
+    #[test]
+    fn names_of_recorders_are_understood() {
+        use Quantity::*;
+        for (name, format, quantity, number) in [
+            ("actual_q_0", Format::Rtde, Position, Some(0)),
+            ("target_q_5", Format::Rtde, Command, Some(5)),
+            ("actual_current_3", Format::Rtde, Current, Some(3)),
+            ("target_moment_3", Format::Rtde, Other, Some(3)),
+            ("actual_qd_2", Format::Rtde, Velocity, Some(2)),
+            ("state.q[6]", Format::Libfranka, Position, Some(6)),
+            ("state.q_d[6]", Format::Libfranka, Command, Some(6)),
+            ("state.dq[1]", Format::Libfranka, Velocity, Some(1)),
+            ("state.tau_J[1]", Format::Libfranka, Torque, Some(1)),
+            ("state.tau_J_d[1]", Format::Libfranka, Other, Some(1)),
+            ("state.dtau_J[1]", Format::Libfranka, Other, Some(1)),
+            ("cmd.tau_J_d[1]", Format::Libfranka, Other, Some(1)),
+            (
+                "state.tau_ext_hat_filtered[1]",
+                Format::Libfranka,
+                Other,
+                Some(1),
+            ),
+            ("actuators[0].position", Format::Kortex, Position, Some(0)),
+            ("positions[2]", Format::Csv, Position, Some(2)),
+            ("control.positions[2]", Format::Csv, Command, Some(2)),
+            (
+                "/joint_states/elbow_joint/effort",
+                Format::Csv,
+                Torque,
+                None,
+            ),
+            ("field.velocity3", Format::Csv, Velocity, Some(3)),
+            ("Joint 4 angle [deg]", Format::Csv, Position, Some(4)),
+        ] {
+            assert_eq!(says(name, format), Some((quantity, number)), "{name}");
+        }
+        assert_eq!(named("foo", Format::Csv), None);
+        assert_eq!(named("O_T_EE[3]", Format::Libfranka), None);
+        assert_eq!(
+            named("Joint 4 angle [deg]", Format::Csv).unwrap().unit,
+            Some("deg")
+        );
+        assert_eq!(named("time_ms", Format::Csv).unwrap().unit, Some("ms"));
+        assert_eq!(named("%time", Format::Csv).unwrap().quantity, Time);
+    }
+
+    #[test]
+    fn joints_are_matched_by_name() {
+        let names = |list: &[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
+        let found = names(&["elbow_joint", "shoulder_lift_joint", "shoulder_pan_joint"]);
+        let robot = [
+            "ur_shoulder_pan_joint",
+            "ur_shoulder_lift_joint",
+            "ur_elbow_joint",
+        ];
+        assert_eq!(match_joints(&found, &robot), [Some(2), Some(1), Some(0)]);
+        let found = names(&["fer_finger_joint1", "fer_joint2", "fer_joint1"]);
+        assert_eq!(
+            match_joints(&found, &["panda_joint1", "panda_joint2"]),
+            [Some(2), Some(1)]
+        );
+        let found = names(&["left_wrist", "right_wrist"]);
+        assert_eq!(match_joints(&found, &["wrist", "elbow"]), [None, None]);
+    }
+}

@@ -1,0 +1,151 @@
+//! A record from a file of any format.
+
+use super::{POSE, check_names, numbered};
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::log::formats::{self, Format, Request, csv};
+use crate::log::layout::{Layout, Place, Time};
+use crate::log::{Purpose, Record, Table, merge};
+use crate::plant::Plant;
+use std::path::{Path, PathBuf};
+
+/// How a record is read, as an experiment states it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Reading {
+    pub format: Option<Format>,
+    pub topic: Option<String>,
+    /// where the quantities stand
+    pub layout: Option<Layout>,
+    /// the part that counts, s from the start
+    pub part: [Option<f64>; 2],
+}
+
+impl Reading {
+    /// Whether a column may be needed: not where the columns are stated by name and it is not among them.
+    fn wants(&self, name: &str) -> bool {
+        let Some(layout) = &self.layout else {
+            return true;
+        };
+        let time = match &layout.time {
+            Some(Time::Column(place, _)) => Some(place),
+            _ => None,
+        };
+        let places = layout
+            .groups
+            .iter()
+            .flat_map(|g| &g.sources)
+            .map(|s| &s.place);
+        places.chain(time).any(|p| match p {
+            Place::Name(n) => n == name,
+            // by number: which one it is shows when all names are known
+            Place::Number(_) => true,
+        }) || layout.time.is_none()
+    }
+}
+
+impl Record {
+    /// Reads a record from a file, or from files that hold a quantity each.
+    pub(crate) fn read_as(
+        paths: &[PathBuf],
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+        reading: &Reading,
+    ) -> Result<Record> {
+        let Some(path) = paths.first() else {
+            return Err(Error::Argument("no log is named".into()));
+        };
+        let table = match own(paths, reading)? {
+            true => {
+                let known =
+                    |name: &str| name == "t" || POSE.contains(&name) || numbered(name).is_some();
+                let joints = plant.actuators();
+                let check = |table: &Table| check_names(table, &joints, path);
+                let (mut table, unknown) = csv::read(path, &known, &check)?;
+                table.warnings.extend(unknown);
+                table
+            }
+            false => foreign(paths, plant, reading)?,
+        };
+        Self::of_table(table, path, plant, purpose, period, reading.part)
+    }
+}
+
+/// Whether it is a log with our names.
+fn own(paths: &[PathBuf], reading: &Reading) -> Result<bool> {
+    let [path] = paths else { return Ok(false) };
+    if reading.layout.is_some()
+        || reading.topic.is_some()
+        || reading.format.is_some_and(|f| f != Format::Csv)
+        || formats::detect(path)? != Format::Csv
+    {
+        return Ok(false);
+    }
+    let names = csv::names(path)?;
+    let ours = |what: &str| {
+        names
+            .iter()
+            .any(|n| numbered(n).is_some_and(|(group, _)| group == what))
+    };
+    // counted from 0 by somebody else
+    if names.iter().any(|n| matches!(numbered(n), Some((_, 0)))) {
+        return Ok(false);
+    }
+    Ok(names.iter().any(|n| n == "t") && (ours("q") || ours("tau")))
+}
+
+/// A table with our names from files with others.
+fn foreign(paths: &[PathBuf], plant: &Plant, reading: &Reading) -> Result<Table> {
+    let joints = plant.actuators();
+    let path: &Path = &paths[0];
+    let mut parts = Vec::new();
+    for path in paths {
+        let wanted = |name: &str| reading.wants(name);
+        let request = Request {
+            format: reading.format,
+            topic: reading.topic.as_deref(),
+            wanted: if paths.len() > 1 { &|_| true } else { &wanted },
+        };
+        parts.push((path.clone(), formats::read(path, &request)?));
+    }
+    let (mut table, format) = merge::merge(parts)?;
+    let mut layout = match &reading.layout {
+        Some(stated) => stated.clone(),
+        None => Layout::of_names(&table, format, &joints, path)?,
+    };
+    if layout.time.is_none() {
+        layout.time = Layout::time_of(&table, format);
+    }
+    let subject = path.display().to_string();
+    if layout.currents {
+        let message = "the columns of tau are motor currents, whose gains are not stated: tau = { columns = […], unit = \
+                       \"A\", scale = [N m at the joint for each A, …] } in [record.columns]";
+        return Err(Error::file(path, "", message));
+    }
+    let mut out = layout.apply(&mut table, &joints, path)?;
+    for what in &layout.without {
+        let weightless = plant.robot().gravity.norm() == 0.0;
+        match what.as_str() {
+            "gravity" if !weightless => {
+                let message = format!(
+                    "tau is stated to be without gravity, but {} has gravity: state gravity = [0, 0, 0] in the robot \
+                     file for such records, or record torques with gravity",
+                    plant.name()
+                );
+                return Err(Error::file(path, "", message));
+            }
+            "gravity" => {}
+            other => out.warnings.push(Warning::new(
+                WarningKind::UnitSuspect,
+                &subject,
+                format!("tau is stated to be without {other}: what is identified is the rest"),
+            )),
+        }
+    }
+    if out.find("tau1").is_none() && out.find("pa1").is_none() {
+        let message = "it has positions and no torques: neither a model nor a load can be told from it (`excite log` \
+                       says what can)";
+        return Err(Error::file(path, "", message));
+    }
+    check_names(&out, &joints, path)?;
+    Ok(out)
+}

@@ -1,0 +1,101 @@
+//! Before a model is identified: do positions and torques fit the robot as they are stated?
+
+use super::claim::{Claim, Means};
+use super::dynamics;
+use super::frame::Frame;
+use super::units::{TURN, fits};
+use crate::error::{Error, Result, Warning};
+use crate::log::{Purpose, Record};
+use crate::plant::Plant;
+use crate::robot::Motion;
+use std::f64::consts::PI;
+
+/// Looks at the longest record of `records` that is fitted and carries nothing: positions in degrees are an error;
+/// joints that are swapped, and turned signs, are warnings with the evidence.
+///
+/// # Errors
+/// Positions that are degrees by the limits of the joints, with the remedy.
+pub fn check(plant: &Plant, records: &[Record]) -> Result<Vec<Warning>> {
+    let joints = plant.actuators();
+    let mut warnings = Vec::new();
+    for record in records {
+        let range = |j: usize| {
+            record.q[j]
+                .iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
+                    [a.min(x), b.max(x)]
+                })
+        };
+        let turns = |j: usize| joints[j].motion == Motion::Revolute;
+        let count = joints.len().min(record.q.len());
+        let far = (0..count).find(|&j| {
+            let [a, b] = range(j);
+            turns(j) && a.abs().max(b.abs()) > TURN && !fits(joints[j], a, b)
+        });
+        let degrees = (0..count).filter(|&j| turns(j)).all(|j| {
+            let [a, b] = range(j).map(|x| x * PI / 180.0);
+            fits(joints[j], a, b)
+        });
+        if let (Some(j), true) = (far, degrees) {
+            let [a, b] = range(j);
+            let message = format!(
+                "the positions of {} go from {a:.3} to {b:.3}, far beyond its limits in rad and within them in degrees, as \
+                 all others are: state unit = \"deg\" for q in [record.columns] (`excite log` writes such an experiment)",
+                joints[j].name
+            );
+            return Err(Error::file(&record.path, "", message));
+        }
+    }
+    let longest = records
+        .iter()
+        .filter(|r| {
+            r.purpose == Purpose::Fit && r.payload == crate::log::Payload::None && !r.tau.is_empty()
+        })
+        .max_by_key(|r| r.len());
+    if let Some(record) = longest.filter(|_| plant.mechanism().is_none()) {
+        let (frame, mut claims) = frame(record, plant);
+        dynamics::examine_stated(&[frame], &mut claims, plant, &mut warnings);
+        for w in &mut warnings {
+            w.subject = format!("{}: {}", record.path.display(), w.subject);
+        }
+    }
+    Ok(warnings)
+}
+
+/// A record as the survey looks at it.
+fn frame(record: &Record, plant: &Plant) -> (Frame, Vec<Claim>) {
+    let mut frame = Frame {
+        paths: vec![record.path.clone()],
+        rows: record.len(),
+        names: vec!["t".into()],
+        time: Some(0),
+        time_unit: "s",
+        step: record.step,
+        columns: vec![record.t.clone()],
+        gaps: Vec::new(),
+        warnings: Vec::new(),
+    };
+    let mut claims = vec![Claim {
+        means: Means::Time,
+        ..Claim::none("t")
+    }];
+    for (group, means, columns) in [
+        ("q", Means::Position, &record.q),
+        ("tau", Means::Torque, &record.tau),
+    ] {
+        for (j, (column, joint)) in columns.iter().zip(plant.actuators()).enumerate() {
+            let name = format!("{group}{}", j + 1);
+            claims.push(Claim {
+                means,
+                at: Some(j),
+                joint: Some(joint.name.clone()),
+                confidence: 0.8,
+                evidence: "its name".into(),
+                ..Claim::none(&name)
+            });
+            frame.names.push(name);
+            frame.columns.push(column.clone());
+        }
+    }
+    (frame, claims)
+}

@@ -1,0 +1,351 @@
+//! A record as it is looked at: its columns on an even grid, without what cannot have been measured.
+
+use super::claim::{Claim, Means};
+use super::file_name;
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::log::Table;
+use crate::log::channels;
+use crate::log::clock::{self, median};
+use crate::log::formats::Format;
+use crate::log::layout::{Layout, Place, Time, time_unit};
+use crate::log::record::impossible;
+use crate::log::resample::{Order, fill, interpolate};
+use crate::plant::Plant;
+use std::path::PathBuf;
+
+/// Grid points of a record, in its rows.
+const MOST: f64 = 3.0;
+
+/// One record.
+#[derive(Debug)]
+pub struct Frame {
+    /// its files
+    pub paths: Vec<PathBuf>,
+    /// rows of the file
+    pub rows: usize,
+    /// names of the columns
+    pub names: Vec<String>,
+    /// number of the column of the time
+    pub time: Option<usize>,
+    /// unit of the time
+    pub time_unit: &'static str,
+    /// step of the grid, s
+    pub step: f64,
+    /// the columns on the grid
+    pub columns: Vec<Vec<f64>>,
+    /// from and to of each gap, s from the start
+    pub gaps: Vec<[f64; 2]>,
+    /// what was wrong
+    pub warnings: Vec<Warning>,
+}
+
+/// What a joint does in a record.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct Course {
+    /// when it moves, s from the start
+    pub moves: Vec<[f64; 2]>,
+    /// least and largest position, rad or m
+    pub range: Option<[f64; 2]>,
+    /// largest velocity, rad/s or m/s
+    pub fastest: Option<f64>,
+    /// samples at which its torque is saturated
+    pub saturated: usize,
+}
+
+impl Frame {
+    pub(super) fn new(paths: Vec<PathBuf>, mut table: Table, format: Format) -> Result<Self> {
+        let path = paths.first().cloned().unwrap_or_default();
+        let rows = table.rows();
+        let subject = file_name(&path);
+        let mut warnings = std::mem::take(&mut table.warnings);
+        for w in &mut warnings {
+            w.subject = subject.clone();
+        }
+        if rows < 8 {
+            return Err(Error::file(&path, "", format!("{rows} rows are too few")));
+        }
+        let found = match Layout::time_of(&table, format) {
+            Some(Time::Column(Place::Number(k), factor)) => Some((k - 1, factor)),
+            _ => even(&table).map(|k| (k, None)),
+        };
+        let (raw, time_name) = match found {
+            Some((k, factor)) => {
+                let (guess, name) = time_unit(&table.columns[k]);
+                let factor = factor.unwrap_or(guess);
+                let name = [
+                    ("s", 1.0),
+                    ("ms", 1e-3),
+                    ("us", 1e-6),
+                    ("ns", 1e-9),
+                    ("min", 60.0),
+                ]
+                .into_iter()
+                .find(|(_, f)| *f == factor)
+                .map_or(name, |(n, _)| n);
+                let column = &table.columns[k];
+                let origin = column
+                    .iter()
+                    .copied()
+                    .find(|x| x.abs() < 1e21)
+                    .unwrap_or(0.0);
+                (column.iter().map(|x| (x - origin) * factor).collect(), name)
+            }
+            None => {
+                warnings.push(Warning::new(
+                    WarningKind::TimeRepaired,
+                    &subject,
+                    "no column is a time: its samples are counted, and all rates are for a step of one second; state \
+                     time = { rate = … }",
+                ));
+                ((0..rows).map(|i| i as f64).collect::<Vec<f64>>(), "none")
+            }
+        };
+        let clock = clock::repair(&raw, &subject);
+        warnings.extend(
+            clock
+                .warnings
+                .iter()
+                .filter(|w| w.kind != WarningKind::UnitSuspect || found.is_some())
+                .cloned(),
+        );
+        if clock.t.len() < 8 {
+            let message = format!(
+                "of {rows} rows only {} have a time stamp later than the one before; which column is the time?",
+                clock.t.len()
+            );
+            return Err(Error::file(&path, "", message));
+        }
+        let first = clock.t[0];
+        let t: Vec<f64> = clock.t.iter().map(|x| x - first).collect();
+        let end = t[t.len() - 1];
+        let count = (end / clock.step + 0.1).floor() as usize + 1;
+        let step = match count as f64 > MOST * t.len() as f64 {
+            true => end / (MOST * t.len() as f64),
+            false => clock.step,
+        };
+        let count = (end / step + 0.1).floor() as usize + 1;
+        let grid: Vec<f64> = (0..count).map(|i| i as f64 * step).collect();
+        let mut columns = Vec::with_capacity(table.columns.len());
+        for (k, column) in table.columns.iter_mut().enumerate() {
+            let mut y: Vec<f64> = match &clock.keep {
+                Some(keep) => keep.iter().map(|&i| column[i]).collect(),
+                None => std::mem::take(column),
+            };
+            let wrong = match found {
+                Some((time, _)) if time == k => Vec::new(),
+                _ => impossible(&y),
+            };
+            if let Some(&at) = wrong.first() {
+                let row = clock.keep.as_ref().map_or(at, |r| r[at]) + 1;
+                warnings.push(Warning::new(
+                    WarningKind::SamplesLeftOut,
+                    format!("{subject}: {}", table.names[k]),
+                    format!(
+                        "{} values cannot have been measured, the first at row {row} ({:e}); they count as dropped",
+                        wrong.len(),
+                        y[at]
+                    ),
+                ));
+            }
+            wrong.iter().for_each(|&i| y[i] = f64::NAN);
+            let holes = y.iter().filter(|x| !x.is_finite()).count();
+            if holes == y.len() {
+                warnings.push(Warning::new(
+                    WarningKind::SamplesLeftOut,
+                    format!("{subject}: {}", table.names[k]),
+                    "it holds no number at all: the channel was not recorded",
+                ));
+                columns.push(vec![0.0; count]);
+                continue;
+            }
+            if holes > wrong.len() {
+                warnings.push(Warning::new(
+                    WarningKind::SamplesLeftOut,
+                    format!("{subject}: {}", table.names[k]),
+                    format!("{holes} of {} values are missing", y.len()),
+                ));
+            }
+            fill(&t, &mut y, Order::Linear);
+            columns.push(match clock.even && count == y.len() {
+                true => y,
+                false => interpolate(&t, &y, &grid, Order::Linear),
+            });
+        }
+        Ok(Frame {
+            paths,
+            rows,
+            names: table.names,
+            time: found.map(|(k, _)| k),
+            time_unit: time_name,
+            step,
+            columns,
+            gaps: clock
+                .gaps
+                .iter()
+                .map(|g| [g[0] - first, g[1] - first])
+                .collect(),
+            warnings,
+        })
+    }
+
+    /// Length, s.
+    pub fn duration(&self) -> f64 {
+        self.step * self.len().saturating_sub(1) as f64
+    }
+
+    /// Samples of the grid.
+    pub fn len(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The column of a joint that means this, in SI units.
+    pub(super) fn channel(&self, claims: &[Claim], means: Means, joint: usize) -> Option<Vec<f64>> {
+        let k = claims
+            .iter()
+            .position(|c| c.means == means && c.at == Some(joint))?;
+        let factor = claims[k].factor();
+        Some(self.columns.get(k)?.iter().map(|x| x * factor).collect())
+    }
+
+    /// What each joint does.
+    pub(super) fn courses(
+        &self,
+        claims: &[Claim],
+        joints: usize,
+        robot: Option<&Plant>,
+    ) -> Vec<Course> {
+        let extent = |y: &[f64]| {
+            y.iter()
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
+                    [a.min(x), b.max(x)]
+                })
+        };
+        (0..joints)
+            .map(|j| {
+                let q = self.channel(claims, Means::Position, j);
+                let (moves, fastest) = match &q {
+                    Some(q) => {
+                        let moving = still_aware(q, self.step);
+                        let k = ((0.02 / self.step) as usize).max(1);
+                        let fastest = (k..q.len())
+                            .map(|i| (q[i] - q[i - k]).abs() / (k as f64 * self.step))
+                            .fold(0.0, f64::max);
+                        (intervals(&moving, self.step), Some(fastest))
+                    }
+                    None => (Vec::new(), None),
+                };
+                let tau = self.channel(claims, Means::Torque, j);
+                let effort = robot.map_or(f64::INFINITY, |p| p.actuators()[j].limits.effort);
+                let saturated = tau.map_or(0, |tau| {
+                    let mut valid = vec![true; tau.len()];
+                    channels::saturated(&tau, effort, &mut valid).map_or(0, |(n, _)| n)
+                });
+                Course {
+                    moves,
+                    range: q.as_deref().map(extent),
+                    fastest,
+                    saturated,
+                }
+            })
+            .collect()
+    }
+}
+
+/// The record in which the columns change most, each measured by its largest range in any record.
+pub(super) fn richest(frames: &[Frame]) -> Option<&Frame> {
+    let width = |f: &Frame, k: usize| {
+        let values = f.columns.get(k).into_iter().flatten();
+        let [a, b] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
+            [a.min(x), b.max(x)]
+        });
+        (b - a).max(0.0)
+    };
+    let columns = frames.first()?.columns.len();
+    let most: Vec<f64> = (0..columns)
+        .map(|k| frames.iter().map(|f| width(f, k)).fold(0.0, f64::max))
+        .collect();
+    let worth = |f: &Frame| -> f64 {
+        (0..columns)
+            .filter(|&k| Some(k) != f.time && most[k] > 0.0)
+            .map(|k| width(f, k) / most[k])
+            .sum()
+    };
+    frames.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))
+}
+
+/// Whether a joint moves, sample by sample: by more than a hundredth of its usual speed, and by more than the steps of
+/// its encoder.
+fn still_aware(q: &[f64], step: f64) -> Vec<bool> {
+    let n = q.len();
+    let k = ((0.1 / step) as usize).clamp(2, (n / 4).max(2));
+    let travel: Vec<f64> = (0..n)
+        .map(|i| {
+            let part = &q[i.saturating_sub(k)..(i + k + 1).min(n)];
+            let (a, b) = part
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
+                    (a.min(x), b.max(x))
+                });
+            b - a
+        })
+        .collect();
+    let largest = travel.iter().copied().fold(0.0, f64::max);
+    let noise = median(
+        q.windows(2)
+            .map(|w| (w[1] - w[0]).abs())
+            .filter(|d| *d > 0.0),
+    );
+    let least = (0.01 * largest).max(if noise.is_finite() { 4.0 * noise } else { 0.0 });
+    // the noise of a moving joint is its motion: never more than a fifth of the largest
+    let least = least.min(0.2 * largest).max(1e-6);
+    travel.iter().map(|x| *x > least).collect()
+}
+
+/// Runs of `true` as times; those shorter than a tenth of a second are left out.
+fn intervals(moving: &[bool], step: f64) -> Vec<[f64; 2]> {
+    let mut out: Vec<[f64; 2]> = Vec::new();
+    let mut from = None;
+    for (i, m) in moving.iter().chain([&false]).enumerate() {
+        match (m, from) {
+            (true, None) => from = Some(i),
+            (false, Some(f)) => {
+                let [a, b] = [f as f64 * step, (i - 1) as f64 * step];
+                match out.last_mut() {
+                    Some(last) if a - last[1] < 0.3 => last[1] = b,
+                    _ if b - a >= 0.1 => out.push([a, b]),
+                    _ => {}
+                }
+                from = None;
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+/// The column that is a time by its numbers: it increases by even steps.
+fn even(table: &Table) -> Option<usize> {
+    let mut best: Option<(usize, f64)> = None;
+    for (k, y) in table.columns.iter().enumerate() {
+        let n = y.len();
+        if n < 8 {
+            continue;
+        }
+        let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();
+        let up = steps.iter().filter(|d| **d > 0.0).count();
+        if (up as f64) < 0.97 * steps.len() as f64 {
+            continue;
+        }
+        let usual = median(steps.iter().copied());
+        let spread = median(steps.iter().map(|d| (d - usual).abs())) / usual;
+        if spread < 0.3 && best.is_none_or(|(_, s)| spread < s) {
+            best = Some((k, spread));
+        }
+    }
+    best.map(|(k, _)| k)
+}

@@ -1,0 +1,217 @@
+//! What the names of the columns state.
+
+use super::claim::{Claim, Means};
+use super::frame::Frame;
+use crate::error::{Warning, WarningKind};
+use crate::log::formats::Format;
+use crate::log::names::{self, Quantity, named};
+use crate::plant::Plant;
+
+/// How far a name is believed that nothing confirms.
+const NAMED: f64 = 0.8;
+/// … and one of a recorder's own file, whose columns are documented.
+const DOCUMENTED: f64 = 0.9;
+
+/// One claim a column, from its name alone.
+pub(super) fn claims(
+    frames: &[Frame],
+    format: Format,
+    robot: Option<&Plant>,
+    warnings: &mut Vec<Warning>,
+) -> Vec<Claim> {
+    let Some(frame) = frames.first() else {
+        return Vec::new();
+    };
+    let confidence = match format {
+        Format::Csv | Format::Npz | Format::Mat => NAMED,
+        _ => DOCUMENTED,
+    };
+    let all: Vec<Option<names::Named>> = frame.names.iter().map(|n| named(n, format)).collect();
+    let mut out: Vec<Claim> = frame.names.iter().map(|n| Claim::none(n)).collect();
+    if let Some(k) = frame.time {
+        out[k].means = Means::Time;
+        out[k].unit = Some(frame.time_unit);
+        out[k].scale = names::unit(frame.time_unit).map_or(1.0, |(_, f)| f);
+        out[k].confidence = 0.99;
+        out[k].evidence = "it increases by even steps".into();
+    }
+    for quantity in [
+        Quantity::Position,
+        Quantity::Velocity,
+        Quantity::Acceleration,
+        Quantity::Torque,
+        Quantity::Current,
+        Quantity::Command,
+        Quantity::Link,
+    ] {
+        let columns: Vec<usize> = (0..all.len())
+            .filter(|&k| {
+                Some(k) != frame.time && all[k].as_ref().is_some_and(|n| n.quantity == quantity)
+            })
+            .collect();
+        if columns.is_empty() {
+            continue;
+        }
+        let order = joints_of(&columns, &all, robot, frame, warnings);
+        for (k, joint) in columns.iter().zip(order) {
+            let Some(name) = &all[*k] else { continue };
+            let claim = &mut out[*k];
+            claim.means = match quantity {
+                Quantity::Position | Quantity::Link => Means::Position,
+                Quantity::Velocity => Means::Velocity,
+                Quantity::Acceleration => Means::Acceleration,
+                Quantity::Torque => Means::Torque,
+                Quantity::Current => Means::Current,
+                _ => Means::Command,
+            };
+            claim.side = match quantity {
+                Quantity::Link => Some("link"),
+                Quantity::Current => Some("motor"),
+                _ => None,
+            };
+            claim.commands = (quantity == Quantity::Command).then_some("position");
+            claim.evidence = "its name".into();
+            claim.confidence = confidence;
+            if let Some((unit, factor)) = name.unit.and_then(names::unit) {
+                claim.unit = Some(unit);
+                claim.scale = factor;
+            }
+            match joint {
+                Some((at, name)) => {
+                    claim.at = Some(at);
+                    claim.joint = Some(name);
+                }
+                None => {
+                    claim.abstain("its name says what it is, but of which joint cannot be told")
+                }
+            }
+        }
+    }
+    magnitudes(frame, &mut out, warnings);
+    out
+}
+
+/// The joint of each column: by name, or in the order of the numbers.
+fn joints_of(
+    columns: &[usize],
+    all: &[Option<names::Named>],
+    robot: Option<&Plant>,
+    frame: &Frame,
+    warnings: &mut Vec<Warning>,
+) -> Vec<Option<(usize, String)>> {
+    let of = |k: usize| all[k].as_ref();
+    let mut out = vec![None; columns.len()];
+    let own: Vec<String> = robot.map_or(Vec::new(), |p| {
+        p.actuators().iter().map(|j| j.name.clone()).collect()
+    });
+    let found: Vec<String> = columns
+        .iter()
+        .map(|&k| of(k).and_then(|n| n.joint.clone()).unwrap_or_default())
+        .collect();
+    if found.iter().all(|f| !f.is_empty()) {
+        let refs: Vec<&str> = own.iter().map(String::as_str).collect();
+        if robot.is_none() {
+            for (i, name) in found.iter().enumerate() {
+                out[i] = Some((i, name.clone()));
+            }
+            return out;
+        }
+        let at = names::match_joints(&found, &refs);
+        if at.iter().any(Option::is_some) {
+            for (j, i) in at.iter().enumerate() {
+                match i {
+                    Some(i) => out[*i] = Some((j, own[j].clone())),
+                    None => warnings.push(Warning::new(
+                        WarningKind::ColumnsIgnored,
+                        &own[j],
+                        format!(
+                            "no column is called like it (there are {})",
+                            found.join(", ")
+                        ),
+                    )),
+                }
+            }
+            return out;
+        }
+    }
+    let mut numbers: Vec<(usize, usize)> = columns
+        .iter()
+        .enumerate()
+        .filter_map(|(i, &k)| Some((of(k)?.number?, i)))
+        .collect();
+    numbers.sort_unstable();
+    let distinct = numbers.windows(2).all(|w| w[0].0 < w[1].0) && numbers.len() == columns.len();
+    if !distinct && columns.len() > 1 {
+        return out;
+    }
+    if columns.len() == 1 && numbers.is_empty() {
+        numbers.push((0, 0));
+    }
+    if robot.is_some() && numbers.len() != own.len() {
+        warnings.push(Warning::new(
+            WarningKind::ColumnsIgnored,
+            &frame.names[columns[0]],
+            format!(
+                "{} columns of this kind, but the robot has {} actuated joints: they were not given to joints by their \
+                 order",
+                numbers.len(),
+                own.len()
+            ),
+        ));
+        return out;
+    }
+    for (at, (_, i)) in numbers.into_iter().enumerate() {
+        let name = own
+            .get(at)
+            .cloned()
+            .unwrap_or_else(|| format!("joint {}", at + 1));
+        out[i] = Some((at, name));
+    }
+    out
+}
+
+/// Names of the joints that the claims are about.
+pub(super) fn joints(claims: &[Claim]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for c in claims {
+        if let (Some(at), Some(name)) = (c.at, &c.joint) {
+            while out.len() <= at {
+                out.push(format!("joint {}", out.len() + 1));
+            }
+            out[at] = name.clone();
+        }
+    }
+    out
+}
+
+/// What is called a torque and is never negative, although its joints go both ways, is the size of a load.
+fn magnitudes(frame: &Frame, claims: &mut [Claim], warnings: &mut Vec<Warning>) {
+    for means in [Means::Torque, Means::Current] {
+        let columns: Vec<usize> = (0..claims.len())
+            .filter(|&k| claims[k].means == means)
+            .collect();
+        let unsigned = |k: &usize| frame.columns[*k].iter().all(|x| *x >= 0.0);
+        let changes = |k: &usize| {
+            let y = &frame.columns[*k];
+            let (a, b) = (y[0], y.iter().copied().fold(0.0, f64::max));
+            y.iter().any(|x| *x != a) && y.iter().any(|x| *x < 0.05 * b)
+        };
+        if columns.len() < 2 || !columns.iter().all(unsigned) || !columns.iter().any(changes) {
+            continue;
+        }
+        for &k in &columns {
+            claims[k].abstain("it is never negative although the joint goes both ways: the size of a load, without sign");
+        }
+        warnings.push(Warning::new(
+            WarningKind::UnitSuspect,
+            &frame.names[columns[0]],
+            format!(
+                "it and {} more columns are called torques and are never negative, although the joints go both ways: \
+                 they are the size of a load, and no torque. There is no torque here: \
+                 positions, velocities and their delay against the command can be told from it, no inertia, no \
+                 friction and no load",
+                columns.len() - 1
+            ),
+        ));
+    }
+}

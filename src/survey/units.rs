@@ -1,0 +1,134 @@
+//! Units of positions from the limits of the robot's joints.
+
+use super::claim::{Claim, Means};
+use super::frame::Frame;
+use crate::error::{Warning, WarningKind};
+use crate::plant::Plant;
+use crate::robot::{Joint, Motion};
+use std::f64::consts::PI;
+
+/// Part of its range by which a joint may exceed it.
+const SLACK: f64 = 0.03;
+/// Range of a joint without limits, rad to either side.
+const FREE: f64 = 4.0 * PI;
+
+/// Positions beyond this are no radians of a joint that turns about once to either side.
+pub(super) const TURN: f64 = 2.5 * PI;
+
+/// Whether positions between `low` and `high` are within the limits of a joint.
+pub(super) fn fits(joint: &Joint, low: f64, high: f64) -> bool {
+    let [mut a, mut b] = joint.limits.position;
+    if joint.motion == Motion::Revolute {
+        a = a.max(-FREE);
+        b = b.min(FREE);
+    }
+    let slack = SLACK * (b - a).min(2.0 * FREE);
+    low >= a - slack && high <= b + slack
+}
+
+/// Least and largest value of a column in all records.
+pub(super) fn extent(frames: &[Frame], k: usize) -> [f64; 2] {
+    let values = frames.iter().filter_map(|f| f.columns.get(k)).flatten();
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
+        [a.min(x), b.max(x)]
+    })
+}
+
+/// Tests the claimed positions of each joint; where they fit in degrees and not as they are stated, they are degrees.
+pub(super) fn examine(
+    frames: &[Frame],
+    claims: &mut [Claim],
+    plant: &Plant,
+    warnings: &mut Vec<Warning>,
+) {
+    let joints = plant.actuators();
+    let columns: Vec<usize> = (0..claims.len())
+        .filter(|&k| {
+            matches!(claims[k].means, Means::Position | Means::Command) && claims[k].at.is_some()
+        })
+        .collect();
+    let within = |claims: &[Claim], k: usize, more: f64| {
+        let [low, high] = extent(frames, k);
+        let f = claims[k].factor() * more;
+        let joint = claims[k].at.and_then(|j| joints.get(j))?;
+        let turns = joint.motion == Motion::Revolute || more == 1.0;
+        Some(turns && fits(joint, (low * f).min(high * f), (low * f).max(high * f)))
+    };
+    let far = columns
+        .iter()
+        .copied()
+        .filter(|&k| within(claims, k, 1.0) == Some(false))
+        .collect::<Vec<_>>();
+    if far.is_empty() {
+        return;
+    }
+    let turns = |k: &usize| {
+        let [low, high] = extent(frames, *k);
+        let revolute = claims[*k]
+            .at
+            .and_then(|j| joints.get(j))
+            .is_some_and(|j| j.motion == Motion::Revolute);
+        revolute && low.abs().max(high.abs()) * claims[*k].scale > TURN
+    };
+    let all = far.iter().any(turns)
+        && columns.iter().all(|&k| {
+            within(claims, k, PI / 180.0) == Some(true)
+                || claims[k]
+                    .at
+                    .and_then(|j| joints.get(j))
+                    .is_some_and(|j| j.motion == Motion::Prismatic)
+        });
+    let [low, high] = extent(frames, far[0]);
+    if all {
+        warnings.push(Warning::new(
+            WarningKind::UnitSuspect,
+            &claims[far[0]].column,
+            format!(
+                "it goes from {low:.3} to {high:.3}, beyond the limits of {} in rad and within them in degrees: it and \
+                 the other positions were taken as degrees",
+                claims[far[0]].joint.clone().unwrap_or_default()
+            ),
+        ));
+        for k in 0..claims.len() {
+            let angle = columns.contains(&k)
+                || claims[k].of.is_some_and(|p| columns.contains(&p))
+                    && claims[k].means != Means::Command;
+            let turns = claims[k]
+                .at
+                .and_then(|j| joints.get(j))
+                .is_some_and(|j| j.motion == Motion::Revolute);
+            if angle && turns {
+                claims[k].scale *= PI / 180.0;
+                claims[k].unit = Some(match claims[k].means {
+                    Means::Velocity => "deg/s",
+                    Means::Acceleration => "deg/s^2",
+                    _ => "deg",
+                });
+                claims[k]
+                    .evidence
+                    .push_str("; degrees, by the limits of the joint");
+            }
+        }
+        return;
+    }
+    for k in far {
+        let [low, high] = extent(frames, k);
+        let f = claims[k].factor();
+        warnings.push(Warning::new(
+            WarningKind::UnitSuspect,
+            &claims[k].column,
+            format!(
+                "as the position of {} it goes from {:.3} to {:.3}, beyond its limits: another unit, another zero or \
+                 another joint",
+                claims[k].joint.clone().unwrap_or_default(),
+                (low * f).min(high * f),
+                (low * f).max(high * f)
+            ),
+        ));
+        // a little beyond is more likely a limit of the file that is not the machine's
+        let width = joints[claims[k].at.unwrap_or(0)].limits.position;
+        if high - low > 1.5 * (width[1] - width[0]) {
+            claims[k].confidence = 0.4;
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! How sure it is which joint a column belongs to, and with which sign.
+
+use super::claim::Claim;
+use super::search::{Hypothesis, Match, Problem};
+use crate::dynamics::Workspace;
+
+/// Blocks of the record, every other one fitted.
+const BLOCKS: usize = 16;
+/// Standard errors by which an alternative must be worse on held-out blocks.
+const SURE: f64 = 3.0;
+/// … and nats.
+const CLEAR: f64 = 6.0;
+/// Least share of a torque column that its joint explains.
+pub(super) const SHARE: f64 = 0.5;
+
+/// How sure a hypothesis is, joint by joint.
+pub(super) struct Verdict {
+    /// whether no other column comes near
+    pub joint: Vec<bool>,
+    /// whether the turned sign does not, either
+    pub sign: Vec<bool>,
+    /// whether all hypotheses that come near give a column of torques to the same joint
+    pub torque: Vec<bool>,
+}
+
+/// Nats by which a hypothesis may be behind and still be looked at on held-out blocks.
+const NEAR: f64 = 60.0;
+/// Most of them.
+const NEAREST: usize = 48;
+
+/// Hypotheses with any other signs whose score comes near.
+fn turned(problem: &Problem, best: &Hypothesis) -> Vec<Hypothesis> {
+    let mut ws = Workspace::default();
+    let score = problem.score(best, &mut ws);
+    let mut near: Vec<(f64, Hypothesis)> = (1..1usize << best.sign.len())
+        .map(|bits| {
+            let mut h = best.clone();
+            for (j, s) in h.sign.iter_mut().enumerate() {
+                if bits >> j & 1 == 1 {
+                    *s = -*s;
+                }
+            }
+            (problem.score(&h, &mut ws), h)
+        })
+        .filter(|(s, _)| *s > score - NEAR)
+        .collect();
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    near.truncate(NEAREST);
+    near.into_iter().map(|(_, h)| h).collect()
+}
+
+impl Verdict {
+    /// Compares `best` with its neighbours and with all other optima, on blocks that were not fitted.
+    pub fn of(
+        problem: &Problem,
+        best: &Hypothesis,
+        found: &[(f64, Hypothesis)],
+        allowed: &dyn Fn(&Hypothesis) -> bool,
+        n: usize,
+    ) -> Self {
+        let mut rivals: Vec<Hypothesis> = Problem::neighbours(best)
+            .into_iter()
+            .map(|(_, h)| h)
+            .filter(|h| allowed(h))
+            .collect();
+        rivals.extend(found.iter().skip(1).map(|(_, h)| h.clone()));
+        // many signs at once: an arm and its mirror image have the same torques
+        rivals.extend(turned(problem, best).into_iter().filter(|h| allowed(h)));
+        let mut ws = Workspace::default();
+        let of = problem.best_joints(best, &mut ws);
+        let mut out = Verdict {
+            joint: vec![true; n],
+            sign: vec![true; n],
+            torque: vec![true; of.len()],
+        };
+        for rival in rivals {
+            if better(problem, best, &rival) {
+                continue;
+            }
+            let other = problem.best_joints(&rival, &mut ws);
+            for (c, same) in out.torque.iter_mut().enumerate() {
+                *same &= other[c] == of[c];
+            }
+            for j in 0..n {
+                out.joint[j] &= rival.column[j] == best.column[j];
+                out.sign[j] &= rival.sign[j] == best.sign[j];
+            }
+        }
+        out
+    }
+
+    pub fn sure(&self, j: usize) -> bool {
+        self.joint[j] && self.sign[j]
+    }
+}
+
+/// Whether `a` predicts held-out blocks better than `b`, beyond doubt.
+pub(super) fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
+    let mut ws = Workspace::default();
+    let gains: Vec<Vec<f64>> = [false, true]
+        .into_iter()
+        .map(|odd| {
+            let count = problem.count();
+            let block = |i: usize| i * BLOCKS / count.max(1);
+            let fit: Vec<bool> = (0..count).map(|i| (block(i) % 2 == 1) == odd).collect();
+            let side = |h: &Hypothesis, ws: &mut Workspace| {
+                let of = problem.best_joints(h, ws);
+                problem.losses(h, &fit, &of, ws)
+            };
+            let (la, lb) = (side(a, &mut ws), side(b, &mut ws));
+            let mut out = vec![0.0; BLOCKS];
+            for (ra, rb) in la.iter().zip(&lb) {
+                let fitted = |r: &Vec<f64>| {
+                    r.iter()
+                        .zip(&fit)
+                        .filter(|(_, f)| **f)
+                        .map(|(x, _)| x)
+                        .sum::<f64>()
+                        / fit.iter().filter(|f| **f).count().max(1) as f64
+                };
+                // the variance of the better of both on the fitted blocks
+                let variance = fitted(ra).min(fitted(rb)).max(1e-300);
+                for i in (0..count).filter(|&i| !fit[i]) {
+                    // a bounded loss: no single sample decides
+                    out[block(i)] +=
+                        0.5 * ((rb[i] / variance).min(100.0) - (ra[i] / variance).min(100.0));
+                }
+            }
+            out
+        })
+        .collect();
+    let per: Vec<f64> = (0..BLOCKS).map(|k| gains[0][k] + gains[1][k]).collect();
+    let sum: f64 = per.iter().sum();
+    let mean = sum / BLOCKS as f64;
+    let spread = per.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (BLOCKS - 1) as f64;
+    let error = (spread * BLOCKS as f64).sqrt();
+    sum > CLEAR && sum > SURE * error
+}
+
+/// Confidence of a sign that only its being usual speaks for.
+pub(super) const LIKELY_SIGN: f64 = 0.6;
+
+/// Which way a joint's column of positions counts.
+pub(super) struct Orientation {
+    /// whether joint and sign are told
+    pub known: bool,
+    pub sign: f64,
+    pub confidence: f64,
+}
+
+/// The sign of each joint: by the model, or, where turning the positions and the torques together changes nothing that is
+/// seen, the usual one: none of them turned, if they agree with one another.
+pub(super) fn orientation(
+    best: &Hypothesis,
+    verdict: &Verdict,
+    matches: &[Vec<Match>],
+    claims: &[Claim],
+    positions: &[usize],
+    torques: &[usize],
+) -> Vec<Orientation> {
+    (0..best.column.len())
+        .map(|j| {
+            if verdict.sure(j) {
+                return Orientation {
+                    known: true,
+                    sign: best.sign[j],
+                    confidence: 0.95,
+                };
+            }
+            let p = positions[best.column[j]];
+            let rates = claims
+                .iter()
+                .filter(|c| c.of == Some(p))
+                .all(|c| c.sign > 0.0);
+            let mine = (0..torques.len()).filter(|&c| {
+                let share = matches[j][c].share;
+                share > SHARE && share >= matches.iter().map(|r| r[c].share).fold(0.0, f64::max)
+            });
+            // with positions as they are, the gains that belong to them
+            let mut gains = mine.map(|c| matches[j][c].gain * best.sign[j]).peekable();
+            let agree = gains.peek().is_some() && gains.all(|g| g > 0.0);
+            Orientation {
+                known: verdict.joint[j] && rates && agree,
+                sign: 1.0,
+                confidence: LIKELY_SIGN,
+            }
+        })
+        .collect()
+}
+
+/// Whether some column of torques is explained by a joint.
+pub(super) fn explained(matches: &[Vec<Match>], j: usize, torques: &[usize]) -> bool {
+    (0..torques.len()).any(|c| {
+        matches[j][c].share > SHARE
+            && matches[j][c].share >= matches.iter().map(|r| r[c].share).fold(0.0, f64::max)
+    })
+}

@@ -1,0 +1,488 @@
+//! Logs as others write them: every format, every layout, and what an experiment states about columns.
+
+use crate::common::shared::shared;
+use excite::log::{Experiment, Record};
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+const ROBOT: &str = r#"<robot name="two">
+<link name="base"/>
+<link name="a"><inertial><mass value="2"/><origin xyz="0.2 0 0"/><inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="b"><inertial><mass value="1"/><origin xyz="0.1 0 0"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="arm_wrist_a" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="5" effort="50"/></joint>
+<joint name="arm_wrist_b" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="5" effort="50"/></joint>
+</robot>"#;
+
+const STEP: f64 = 0.01;
+const COUNT: usize = 200;
+
+/// Positions and torques of `wrist_b` and `wrist_a`, as `tests/data/make_logs.py` makes them.
+fn state(t: f64) -> ([f64; 2], [f64; 2]) {
+    let q = [
+        0.5 * (3.0 * t).sin() + 0.2 * (5.0 * t).cos(),
+        0.4 * (4.0 * t).cos() + 0.1 * (7.0 * t).sin(),
+    ];
+    (q, [3.0 * (2.0 * t + 0.3).sin(), 2.0 * (3.0 * t).sin()])
+}
+
+fn folder() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("two.urdf"), ROBOT).unwrap();
+    dir
+}
+
+/// Reads a record whose entry has these lines beside `use`.
+fn read(dir: &Path, entry: &str) -> excite::Result<Record> {
+    let path = dir.join("experiment.toml");
+    let text = format!("robot = \"two.urdf\"\n[[record]]\nuse = \"fit\"\n{entry}\n");
+    std::fs::write(&path, text).unwrap();
+    Ok(Experiment::read(&path)?.records.remove(0))
+}
+
+fn error(dir: &Path, entry: &str) -> String {
+    read(dir, entry).unwrap_err().to_string()
+}
+
+/// Whether a record holds the motion: `first` and `second` are the columns of our joints 1 and 2.
+fn holds(r: &Record, [first, second]: [usize; 2], tolerance: f64, what: &str) {
+    assert_eq!(r.len(), COUNT, "{what}");
+    for (i, &t) in r.t.iter().enumerate() {
+        let (q, tau) = state(i as f64 * STEP);
+        assert!(
+            (t - r.t[0] - i as f64 * STEP).abs() < 1e-6,
+            "{what}: time {t}"
+        );
+        for (j, k) in [first, second].into_iter().enumerate() {
+            assert!(
+                (r.q[j][i] - q[k]).abs() < tolerance,
+                "{what}: q{} at {i}: {} {}",
+                j + 1,
+                r.q[j][i],
+                q[k]
+            );
+            assert!(
+                (r.tau[j][i] - tau[k]).abs() < 10.0 * tolerance,
+                "{what}: tau{} at {i}",
+                j + 1
+            );
+        }
+    }
+}
+
+fn data(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data/logs")
+        .join(name);
+    format!("log = {:?}", path.display().to_string())
+}
+
+/// Bags: joints by name, in whatever order the messages have them.
+#[test]
+fn bags_are_read_by_the_names_of_the_joints() {
+    let dir = folder();
+    for name in ["two.db3", "two_none.mcap", "two_zstd.mcap", "two_lz4.mcap"] {
+        let topic = if name == "two.db3" {
+            "\ntopic = \"/joint_states\""
+        } else {
+            ""
+        };
+        let r = read(dir.path(), &format!("{}{topic}", data(name))).unwrap();
+        holds(&r, [1, 0], 1e-9, name);
+        assert!(r.dq.is_some(), "{name}");
+    }
+    let two = data("two.db3");
+    for topic in ["/controller/state", "/dynamic"] {
+        let entry = format!("{two}\ntopic = \"{topic}\"");
+        let mut r = read(dir.path(), &entry).unwrap();
+        if topic == "/controller/state" {
+            assert!((r.qref.as_ref().unwrap()[0][5] - r.q[0][5] - 0.001).abs() < 1e-9);
+        }
+        r.qref = None;
+        holds(&r, [1, 0], 1e-9, topic);
+    }
+    let entry = format!(
+        "{two}\ntopic = \"/array\"\nformat = \"db3\"\n[record.columns]\nq = [\"data[1]\", \"data[0]\"]\ntau = [\"data[3]\", \"data[2]\"]"
+    );
+    holds(&read(dir.path(), &entry).unwrap(), [1, 0], 1e-9, "array");
+    // what was chosen and left out is said
+    let r = read(dir.path(), &format!("{two}\ntopic = \"/joint_states\"")).unwrap();
+    let all: Vec<String> = r.warnings.iter().map(ToString::to_string).collect();
+    assert!(
+        all.iter()
+            .any(|w| w.contains("20 messages") && w.contains("finger")),
+        "{all:#?}"
+    );
+    let e = error(dir.path(), &format!("{two}\ntopic = \"/nothing\""));
+    assert!(
+        e.contains("/nothing") && e.contains("/dynamic (control_msgs"),
+        "{e}"
+    );
+    let e = error(dir.path(), &format!("{two}\nformat = \"mcap\""));
+    assert!(e.contains("db3"), "{e}");
+}
+
+#[test]
+fn arrays_of_numpy_and_matlab_are_read() {
+    let dir = folder();
+    for (name, columns) in [
+        (
+            "two.npz",
+            "q = [\"q[0]\", \"q[1]\"]\ntau = [\"tau[0]\", \"tau[1]\"]",
+        ),
+        (
+            "two_packed.npz",
+            "time = { column = \"t\", unit = \"ns\" }\nq = [\"q[0]\", \"q[1]\"]\ntau = [\"tau[0]\", \"tau[1]\"]",
+        ),
+        (
+            "two.mat",
+            "time = \"log.t\"\nq = [\"log.q[0]\", \"log.q[1]\"]\ntau = [\"log.tau[0]\", \"log.tau[1]\"]",
+        ),
+        (
+            "two_big.mat",
+            "q = [\"q[0]\", \"q[1]\"]\ntau = [\"tau[0]\", \"tau[1]\"]",
+        ),
+    ] {
+        let r = read(
+            dir.path(),
+            &format!("{}\n[record.columns]\n{columns}", data(name)),
+        )
+        .unwrap();
+        holds(&r, [0, 1], 1e-9, name);
+        // and by their names alone
+        let r = read(dir.path(), &data(name)).unwrap();
+        holds(&r, [0, 1], 1e-9, name);
+    }
+}
+
+/// A file that is cut anywhere, or of which a byte is another, is an error or is read: never a panic.
+#[test]
+fn damaged_files_do_not_end_the_program() {
+    let dir = folder();
+    for name in [
+        "two.db3",
+        "two_zstd.mcap",
+        "two_lz4.mcap",
+        "two_packed.npz",
+        "two.mat",
+    ] {
+        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/data/logs")
+            .join(name);
+        let whole = std::fs::read(path).unwrap();
+        let mut state = 1u64;
+        let mut random = |n: usize| {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 33) as usize % n
+        };
+        for k in 0..60 {
+            let mut bytes = whole.clone();
+            match k % 3 {
+                0 => bytes.truncate(random(whole.len())),
+                1 => (0..20).for_each(|_| bytes[random(whole.len())] = random(256) as u8),
+                _ => bytes[random(600)] ^= 1 << random(8),
+            }
+            std::fs::write(dir.path().join("damaged.bin"), bytes).unwrap();
+            let _ = read(dir.path(), "log = \"damaged.bin\"");
+        }
+    }
+}
+
+/// A table in some layout: a line before the rows, one row, what stands between.
+fn table(dir: &Path, head: &str, row: impl Fn(f64, [f64; 2], [f64; 2]) -> String) {
+    let mut text = String::from(head);
+    for i in 0..COUNT {
+        let t = i as f64 * STEP;
+        let (q, tau) = state(t);
+        let _ = writeln!(text, "{}", row(t, q, tau));
+    }
+    std::fs::write(dir.join("log.txt"), text).unwrap();
+}
+
+#[test]
+fn tables_of_any_layout_are_read_by_their_names() {
+    let dir = folder();
+    let dir = dir.path();
+    type Row = fn(f64, [f64; 2], [f64; 2]) -> String;
+    let layouts: [(&str, &str, Row, [usize; 2]); 12] = [
+        (
+            "semicolons and decimal commas",
+            "time;q1;q2;tau1;tau2\n",
+            |t, q, w| format!("{t:.4};{};{};{};{}", q[0], q[1], w[0], w[1]).replace('.', ","),
+            [0, 1],
+        ),
+        (
+            "tabs",
+            "% a comment\ntime_ms\tpos_1\tpos_2\ttorque_1\ttorque_2\n",
+            |t, q, w| format!("{}\t{}\t{}\t{}\t{}", 1e3 * t, q[0], q[1], w[0], w[1]),
+            [0, 1],
+        ),
+        (
+            "blanks under a comment",
+            "# t q0 q1 tau0 tau1\n",
+            |t, q, w| format!("  {t:.3}   {}  {} {} {}", q[0], q[1], w[0], w[1]),
+            [0, 1],
+        ),
+        (
+            "lists in cells",
+            "type,timestamp,positions,torques\n",
+            |t, q, w| {
+                format!(
+                    "STATE,{},\"[{}, {}]\",\"[{}, {}]\"",
+                    1e6 * t + 7.5,
+                    q[0],
+                    q[1],
+                    w[0],
+                    w[1]
+                )
+            },
+            [0, 1],
+        ),
+        (
+            "lists of numpy",
+            "stamp;q;tau\n",
+            |t, q, w| format!("{t:.3};[ {} {}];[{}  {}]", q[0], q[1], w[0], w[1]),
+            [0, 1],
+        ),
+        (
+            "stamps",
+            "date,q1,q2,tau1,tau2\n",
+            |t, q, w| {
+                format!(
+                    "2020-01-22T12:59:{:09.6}Z,{},{},{},{}",
+                    58.0 + t.min(1.9),
+                    q[0],
+                    q[1],
+                    w[0],
+                    w[1]
+                )
+            },
+            [0, 1],
+        ),
+        (
+            "nanoseconds since 1970",
+            "%time,field.position0,field.position1,field.effort0,field.effort1\n",
+            |t, q, w| {
+                format!(
+                    "{},{},{},{},{}",
+                    1_600_000_000_000_000_000u64 + (t * 1e9).round() as u64,
+                    q[0],
+                    q[1],
+                    w[0],
+                    w[1]
+                )
+            },
+            [0, 1],
+        ),
+        (
+            "RTDE",
+            "timestamp actual_q_0 actual_q_1 target_q_0 target_q_1 actual_current_as_torque_0 actual_current_as_torque_1\n",
+            |t, q, w| {
+                format!(
+                    "{:.3} {} {} {} {} {} {}",
+                    1000.0 + t,
+                    q[0],
+                    q[1],
+                    q[0],
+                    q[1],
+                    w[0],
+                    w[1]
+                )
+            },
+            [0, 1],
+        ),
+        (
+            "libfranka",
+            "time,state.q[0],state.q[1],state.q_d[0],state.q_d[1],state.tau_J[0],state.tau_J[1],state.tau_J_d[0],state.tau_J_d[1]\n",
+            |t, q, w| {
+                format!(
+                    "{},{},{},{},{},{},{},0,0",
+                    1e3 * t,
+                    q[0],
+                    q[1],
+                    q[0],
+                    q[1],
+                    w[0],
+                    w[1]
+                )
+            },
+            [0, 1],
+        ),
+        (
+            "Kortex",
+            "time,actuators[0].position,actuators[1].position,actuators[0].torque,actuators[1].torque\n",
+            |t, q, w| {
+                let deg = q.map(|x| x * 180.0 / PI);
+                format!("{t},{},{},{},{}", deg[0], deg[1], w[0], w[1])
+            },
+            [0, 1],
+        ),
+        (
+            "joints by name",
+            "__time,/joint_states/wrist_b/position,/joint_states/wrist_a/position,/joint_states/wrist_b/effort,/joint_states/wrist_a/effort\n",
+            |t, q, w| format!("{t},{},{},{},{}", q[0], q[1], w[0], w[1]),
+            [1, 0],
+        ),
+        (
+            "units in brackets",
+            "time [s],angle 1 [deg],angle 2 [deg],torque 1 [mNm],torque 2 [mNm]\n",
+            |t, q, w| {
+                let deg = q.map(|x| x * 180.0 / PI);
+                format!("{t},{},{},{},{}", deg[0], deg[1], 1e3 * w[0], 1e3 * w[1])
+            },
+            [0, 1],
+        ),
+    ];
+    for (what, head, row, joints) in layouts {
+        table(dir, head, row);
+        let r = read(dir, "log = \"log.txt\"").unwrap_or_else(|e| panic!("{what}: {e}"));
+        if what == "stamps" {
+            // cut at a minute by the test's own writing
+            assert!(r.len() >= 190, "{what}: {}", r.len());
+            continue;
+        }
+        holds(&r, joints, 1e-6, what);
+    }
+}
+
+/// The columns of an experiment: by number, with units, signs, gears and delays; parts of a record.
+#[test]
+fn an_experiment_states_its_columns() {
+    let dir = folder();
+    let dir = dir.path();
+    // no header; torques come 20 ms late; motor side with a gear of 50 and turned
+    table(dir, "", |t, q, _| {
+        let (_, w) = state(t - 0.02);
+        format!(
+            "{},{},{},{},{}",
+            1e3 * t,
+            -50.0 * q[0],
+            q[1] * 180.0 / PI,
+            w[0] / 50.0,
+            -2.0 * w[1]
+        )
+    });
+    let e = error(dir, "log = \"log.txt\"");
+    assert!(e.contains("time") && e.contains("record.columns"), "{e}");
+    let columns = "[record.columns]\ntime = { column = 1, unit = \"ms\" }\n\
+                   q = { columns = [2, 3], gear = [50, 1], sign = [-1, 1], scale = [1, 0.017453292519943295] }\n\
+                   tau = { columns = [4, 5], gear = [50, 1], scale = [1, 0.5], sign = [1, -1], delay = 0.02 }";
+    let r = read(dir, &format!("log = \"log.txt\"\n{columns}")).unwrap();
+    for i in 5..COUNT - 5 {
+        let (q, tau) = state(i as f64 * STEP);
+        for j in 0..2 {
+            assert!((r.q[j][i] - q[j]).abs() < 1e-9, "q{} at {i}", j + 1);
+            assert!((r.tau[j][i] - tau[j]).abs() < 1e-9, "tau{} at {i}", j + 1);
+        }
+    }
+    // a part, counted from the start
+    let r = read(
+        dir,
+        &format!("log = \"log.txt\"\nfrom = 0.5\nto = 1.5\n{columns}"),
+    )
+    .unwrap();
+    assert_eq!(r.len(), 101);
+    assert!((r.q[0][0] - state(0.5).0[0]).abs() < 1e-9);
+    // no time at all
+    let rate = columns.replace("{ column = 1, unit = \"ms\" }", "{ rate = 100 }");
+    assert_eq!(
+        read(dir, &format!("log = \"log.txt\"\n{rate}"))
+            .unwrap()
+            .len(),
+        COUNT
+    );
+    for (from, to, word) in [
+        ("gear = [50, 1], sign", "gears = 3, sign", "columns.q.gears"),
+        ("time =", "clock =", "columns.clock"),
+        ("unit = \"ms\"", "units = \"ms\"", "columns.time.units"),
+        ("[4, 5]", "[4]", "list of 1 numbers"),
+        ("[4, 5]", "[4, 9]", "no column 9"),
+        ("[4, 5]", "[4, \"x\"]", "no column `x`"),
+        ("[4, 5]", "[4, 2]", "named twice"),
+        ("sign = [1, -1]", "sign = [1, 2]", "1 or -1"),
+        ("delay = 0.02", "delay = 20.0", "in seconds"),
+        ("delay = 0.02", "unit = \"furlong\"", "furlong"),
+        (
+            "delay = 0.02",
+            "without = [\"gravity\"]",
+            "gravity = [0, 0, 0]",
+        ),
+        (
+            "scale = [1, 0.5], sign = [1, -1], delay = 0.02",
+            "unit = \"A\"",
+            "motor currents",
+        ),
+    ] {
+        let e = error(
+            dir,
+            &format!("log = \"log.txt\"\n{}", columns.replace(from, to)),
+        );
+        assert!(e.contains(word), "{word}: {e}");
+    }
+    for (entry, word) in [
+        ("from = 1.5\nto = 0.5", "not before"),
+        ("from = -1.0", "seconds from"),
+        ("from = 50.0", "lie between"),
+        ("form = \"csv\"", "form"),
+        ("format = \"xls\"", "xls"),
+    ] {
+        let e = error(dir, &format!("log = \"log.txt\"\n{entry}\n{columns}"));
+        assert!(e.contains(word), "{word}: {e}");
+    }
+}
+
+/// One file a quantity, on clocks of their own.
+#[test]
+fn files_with_a_quantity_each_are_one_record() {
+    let dir = folder();
+    let dir = dir.path();
+    table(dir, "time,torque_1,torque_2\n", |t, _, w| {
+        format!("{t},{},{}", w[0], w[1])
+    });
+    std::fs::rename(dir.join("log.txt"), dir.join("torques.csv")).unwrap();
+    table(dir, "time,position_1,position_2\n", |t, q, _| {
+        format!("{t},{},{}", q[0], q[1])
+    });
+    let r = read(dir, "log = [\"log.txt\", \"torques.csv\"]").unwrap();
+    holds(&r, [0, 1], 1e-9, "two files");
+    let e = error(dir, "log = \"log.txt\"");
+    assert!(e.contains("no torques"), "{e}");
+}
+
+/// The recordings of real robots: the same numbers from every container, joints by name.
+#[test]
+fn recorded_bags_are_read() {
+    let Some(bags) = shared("data/bags") else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("experiment.toml");
+    for (robot, files, rows) in [
+        ("panda", ["panda.db3", "panda_zstd.mcap"], 727),
+        ("ur10", ["ur10.db3", "ur10_lz4.mcap"], 3441),
+    ] {
+        let read = |file: &str| {
+            let log = bags.join(file);
+            let text = format!(
+                "robot = \"{robot}\"\n[[record]]\nlog = {:?}\nuse = \"fit\"\n",
+                log.display().to_string()
+            );
+            std::fs::write(&path, text).unwrap();
+            Experiment::read(&path).unwrap().records.remove(0)
+        };
+        let (a, b) = (read(files[0]), read(files[1]));
+        assert!(a.len().abs_diff(rows) < 3, "{robot}: {}", a.len());
+        assert_eq!(a.len(), b.len());
+        for j in 0..a.q.len() {
+            for i in 0..a.len() {
+                assert!(
+                    (a.q[j][i] - b.q[j][i]).abs() < 1e-6,
+                    "{robot} q{} at {i}",
+                    j + 1
+                );
+            }
+        }
+    }
+}
