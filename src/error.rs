@@ -179,12 +179,20 @@ warning_kinds! {
     StandstillLeftOut = "standstill_left_out",
     /// What a model leaves of one joint goes with another joint; the joints seem to be coupled.
     JointsCoupled = "joints_coupled",
+    /// The identified model predicts worse than the nominal one.
+    WorseThanNominal = "worse_than_nominal",
+    /// An identified parameter is not what such a robot has.
+    ParameterImplausible = "parameter_implausible",
+    /// What a model leaves goes with a column that it lacks; the column is proposed.
+    ColumnProposed = "column_proposed",
     /// The robot file lists no joint terms; friction and offset are identified.
     JointTermsAssumed = "joint_terms_assumed",
     /// No record of the empty robot is there; its nominal model was subtracted.
     NominalModelAssumed = "nominal_model_assumed",
     /// Measured torques were divided by a gain that a known load showed.
     DriveGainApplied = "drive_gain_applied",
+    /// No known load tells the drive gains; the load is as good as they are.
+    DriveGainAssumed = "drive_gain_assumed",
     /// An effort limit cut a simulated torque.
     TorqueSaturated = "torque_saturated",
     /// Simulated friction did not settle within a step.

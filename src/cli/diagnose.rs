@@ -96,11 +96,14 @@ pub fn run(args: Args) -> Result<()> {
         };
         let _ = writeln!(
             out,
-            "\n{} ({place}): confidence {}, explains {}, {} on holdout",
+            "\n{} ({place}): confidence {}, explains {}, {}",
             f.effect,
             percent(f.confidence),
             percent(f.explains),
-            percent(f.holdout)
+            match f.holdout {
+                Some(h) => format!("{} on holdout", percent(h)),
+                None => "no holdout record".into(),
+            }
         );
         for v in &f.values {
             let _ = match v.std {

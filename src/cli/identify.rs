@@ -5,7 +5,7 @@ use excite::export::{self, Model};
 use excite::identify::page;
 use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
 use excite::log::Experiment;
-use excite::robot::JointTerm;
+use excite::robot::{JointTerm, Prior};
 use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -98,9 +98,12 @@ pub fn run(args: Args) -> Result<()> {
     let plant = &experiment.plant;
     let mut id = identify(plant, &experiment.records, &settings)?;
     id.warnings.splice(0..0, notes);
+    let mut robot = plant.with_values(&id.phi);
+    // what is written comes from measurements, whatever the nominal values came from
+    robot.prior = Prior::Identified;
     let model = Model {
         plant,
-        robot: &plant.with_values(&id.phi),
+        robot: &robot,
         remarks: &[],
     };
     let texts = export::write(&model);

@@ -58,6 +58,24 @@ pub struct Args {
     /// Cut-off of the filter that torques and model pass, Hz; inf for none [default: from the data]
     #[arg(long, value_name = "HZ")]
     cutoff: Option<f64>,
+    /// Write the load for a controller, too: franka (endeffector-config.json for Desk), ur (set_target_payload.script),
+    /// kuka (load_data.dat)
+    #[arg(
+        long = "for",
+        value_enum,
+        value_name = "CONTROLLER",
+        value_delimiter = ','
+    )]
+    controllers: Vec<Controller>,
+    /// Where the flange is in the frame of the body that carries the load, for the controllers: x,y,z in m and
+    /// roll,pitch,yaw in rad
+    #[arg(
+        long,
+        value_name = "POSE",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    flange: Option<Vec<f64>>,
     /// Print load.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
@@ -67,6 +85,32 @@ pub struct Args {
 enum What {
     Full,
     MassCom,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Controller {
+    Franka,
+    Ur,
+    Kuka,
+}
+
+impl Controller {
+    fn file(self) -> &'static str {
+        match self {
+            Controller::Franka => "endeffector-config.json",
+            Controller::Ur => "set_target_payload.script",
+            Controller::Kuka => "load_data.dat",
+        }
+    }
+
+    fn text(self, found: &Identified) -> Result<String> {
+        let (load, flange) = (&found.load().inertia, &found.flange);
+        match self {
+            Controller::Franka => Ok(pretty(&load::controller::franka(load, flange)?)),
+            Controller::Ur => load::controller::urscript(load, flange),
+            Controller::Kuka => load::controller::kuka(load, flange),
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -110,15 +154,31 @@ pub fn run(args: Args) -> Result<()> {
         atmosphere: args.atmosphere,
         ..Settings::default()
     };
+    if let Some(pose) = &args.flange {
+        settings.flange = pose
+            .as_slice()
+            .try_into()
+            .map_err(|_| Error::Argument("--flange is six numbers: x,y,z,roll,pitch,yaw".into()))?;
+        if settings.flange.iter().any(|x| !x.is_finite()) {
+            return Err(Error::Argument(
+                "--flange holds a number that is not finite".into(),
+            ));
+        }
+    }
     settings.signals.position_cutoff = args.position_cutoff;
     settings.signals.cutoff = args.cutoff;
     let experiment = Experiment::read(&args.experiment)?;
-    let files = prepare_dir(&args.output, &["load.json", "report.html"], args.force)?;
+    let mut names = vec!["load.json", "report.html"];
+    names.extend(args.controllers.iter().map(|c| c.file()));
+    let files = prepare_dir(&args.output, &names, args.force)?;
     let found = load::identify(&experiment, &settings)?;
     warn(&found.warnings);
     let json = load::json::json(&found);
     write(&files[0], args.force, &pretty(&json))?;
     write(&files[1], args.force, &load::page::html(&found))?;
+    for (controller, file) in args.controllers.iter().zip(&files[2..]) {
+        write(file, args.force, &controller.text(&found)?)?;
+    }
     match args.json {
         true => print(&pretty(&json)),
         false => print(&summary(&found, &files)),
@@ -129,23 +189,31 @@ fn summary(found: &Identified, files: &[PathBuf]) -> String {
     let mut out = String::new();
     let mut line = |name: &str, body: &load::LoadBody| {
         let (v, s) = (body.values(), body.stds());
-        let _ = writeln!(out, "{name}: mass {:.4} ± {:.4} kg", v[0], s[0]);
+        let _ = writeln!(
+            out,
+            "{name}: mass {:.4} ± {:.4} kg (95 %)",
+            v[0],
+            1.96 * s[0]
+        );
         let _ = writeln!(
             out,
             "  centre of mass ({:.2}, {:.2}, {:.2}) ± ({:.2}, {:.2}, {:.2}) mm",
             1e3 * v[1],
             1e3 * v[2],
             1e3 * v[3],
-            1e3 * s[1],
-            1e3 * s[2],
-            1e3 * s[3]
+            1.96e3 * s[1],
+            1.96e3 * s[2],
+            1.96e3 * s[3]
         );
         if body.known.iter().all(|k| *k) {
-            let _ = writeln!(
-                out,
-                "  inertia about it: xx {:.4}, xy {:.4}, xz {:.4}, yy {:.4}, yz {:.4}, zz {:.4} kg m²",
-                v[4], v[5], v[6], v[7], v[8], v[9]
-            );
+            let sure = load::json::determined(body);
+            let names = ["xx", "xy", "xz", "yy", "yz", "zz"];
+            let entry = |k: usize| match sure[4 + k] {
+                true => format!("{} {:.4}", names[k], v[4 + k]),
+                false => format!("{} not determined", names[k]),
+            };
+            let all: Vec<String> = (0..6).map(entry).collect();
+            let _ = writeln!(out, "  inertia about it: {} kg m²", all.join(", "));
         }
     };
     line(&format!("{}, one step", found.frame), &found.one_step.load);

@@ -24,3 +24,45 @@ impl Column {
             .map(|(_, v)| v.as_slice())
     }
 }
+
+/// The columns of the nominal model on the rows of one actuator; those of zeros take no room.
+#[derive(Debug, Clone, Default)]
+pub struct Columns {
+    rows: usize,
+    all: Vec<Option<Vec<f64>>>,
+}
+
+impl Columns {
+    /// `count` columns of zeros.
+    pub fn new(rows: usize, count: usize) -> Self {
+        let all = vec![None; count];
+        Columns { rows, all }
+    }
+
+    /// A column, where it is not zero.
+    pub fn get(&self, c: usize) -> Option<&[f64]> {
+        self.all[c].as_deref()
+    }
+
+    /// A column to be written.
+    pub fn write(&mut self, c: usize) -> &mut [f64] {
+        self.all[c].get_or_insert_with(|| vec![0.0; self.rows])
+    }
+
+    /// Adds a column.
+    pub fn push(&mut self, column: Option<Vec<f64>>) {
+        self.all.push(column);
+    }
+
+    /// The sum of all with these coefficients.
+    pub fn times(&self, coefficients: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; self.rows];
+        for (column, x) in self.all.iter().zip(coefficients) {
+            let Some(column) = column.as_ref().filter(|_| *x != 0.0) else {
+                continue;
+            };
+            out.iter_mut().zip(column).for_each(|(o, v)| *o += x * v);
+        }
+        out
+    }
+}

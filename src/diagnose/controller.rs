@@ -219,7 +219,9 @@ impl Signals {
             let each = fitted.iter().enumerate().flat_map(|(i, k)| {
                 let r = &data.records[*k];
                 let rows = limited(&column(i, *k), r.cycle, r.dt);
-                r.silenced(&rows).into_owned()
+                let kept = rows.into_iter().zip(&r.measured);
+                kept.map(|(x, m)| if *m { x } else { 0.0 })
+                    .collect::<Vec<_>>()
             });
             each.collect()
         };

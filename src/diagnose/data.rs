@@ -3,7 +3,7 @@
 // several arrays share the index of an actuator
 #![allow(clippy::needless_range_loop)]
 
-use super::column::Column;
+use super::column::{Column, Columns};
 use super::noise::{Noise, ORDER};
 use super::prior::{self, Closeness, factors};
 use super::rigid::{inertia, rigid};
@@ -14,7 +14,6 @@ use crate::error::Result;
 use crate::plant::{self, Parameter, Plant};
 use crate::robot::JointTerm;
 use crate::signals::series::Series;
-use faer::Mat;
 use rayon::prelude::*;
 
 /// The records of an experiment with everything that does not depend on an effect.
@@ -34,7 +33,7 @@ pub struct Data<'a> {
     /// factors on them that were estimated
     pub closeness: Closeness,
     /// regressor by actuator, rows of all records × parameters
-    pub w: Vec<Mat<f64>>,
+    pub w: Vec<Columns>,
     /// torque that no parameter stands for, by actuator
     pub known: Vec<Vec<f64>>,
     /// measured torque, by actuator
@@ -47,7 +46,7 @@ pub struct Data<'a> {
     /// inertia that an actuator accelerates, about the middle of the motion, kg m² or kg
     pub inertia: Vec<f64>,
     /// variance of the window over which the torque channel averages, beyond plus and minus one
-    /// sample, in samples squared
+    /// sample, in samples squared; negative where it takes the torque at an instant
     pub window: f64,
     /// largest speed of each actuator in the fitted records
     pub speed: Vec<f64>,
@@ -68,6 +67,16 @@ impl<'a> Data<'a> {
     /// Rows of an actuator in all records.
     pub fn rows(&self) -> usize {
         self.start[self.records.len()]
+    }
+
+    /// Whether anything moves in the fitted records.
+    pub fn moves(&self) -> bool {
+        self.records.iter().any(|r| r.fit && r.moves())
+    }
+
+    /// Whether there is a record to predict in which anything moves.
+    pub fn predicts(&self) -> bool {
+        self.records.iter().any(|r| !r.fit && r.moves())
     }
 
     /// Rows of record `k`.
@@ -105,14 +114,12 @@ impl<'a> Data<'a> {
         let rows = start[records.len()];
         let parameters = plant.parameters().to_vec();
         let p = parameters.len();
-        let mut w: Vec<Mat<f64>> = (0..n).map(|_| Mat::zeros(rows, p)).collect();
+        let mut w: Vec<Columns> = (0..n).map(|_| Columns::new(rows, p)).collect();
         let mut known = vec![vec![0.0; rows]; n];
         let mut tau = vec![vec![0.0; rows]; n];
-        let models: Vec<_> = records
-            .par_iter()
-            .map(|r| Ok((plant.regressor(&r.x)?, plant.known_torque(&r.x)?)))
-            .collect::<Result<_>>()?;
-        for (k, (r, (y, rest))) in records.iter().zip(models).enumerate() {
+        // one record after another: a regressor with all its zeros is large
+        for (k, r) in records.iter().enumerate() {
+            let (y, rest) = (plant.regressor(&r.x)?, plant.known_torque(&r.x)?);
             for j in 0..n {
                 let at = j * r.count;
                 tau[j][start[k]..start[k + 1]].copy_from_slice(r.torque(j));
@@ -126,9 +133,7 @@ impl<'a> Data<'a> {
                     if from.iter().all(|v| *v == 0.0) {
                         continue;
                     }
-                    let to = w[j].col_mut(c);
-                    let to = to.try_as_col_major_mut().expect("column major");
-                    averaged(&from, &mut to.as_slice_mut()[start[k]..start[k + 1]]);
+                    averaged(&from, &mut w[j].write(c)[start[k]..start[k + 1]]);
                 }
             }
         }
@@ -173,30 +178,30 @@ impl<'a> Data<'a> {
             None => (0..n).map(|j| data.first_noise(j)).collect(),
         };
         data.spread = prior::spread(plant, &data.parameters, &data.noise, &data.speed);
-        let measured = data.measured();
-        data.weights
-            .iter_mut()
-            .for_each(|w| w.clone_from(&measured));
+        data.weights = (0..n).map(|j| data.counted(j)).collect();
         Ok(data)
     }
 
-    /// Weights of rows by what was measured: 0 where a sample was not, and where the whitening filters
-    /// still feel it; 1 elsewhere.
-    pub fn measured(&self) -> Vec<f64> {
+    /// Weights of the rows of an actuator by what they say: 0 where a sample was not measured or the actuator
+    /// stood still, and where the whitening filters still feel it; 1 elsewhere.
+    pub fn counted(&self, j: usize) -> Vec<f64> {
         self.each(|r, _| {
+            let counted = r.counted(j);
             let mut weights = vec![1.0; r.count];
-            for i in (0..r.count).filter(|i| !r.measured[*i]) {
+            for i in (0..r.count).filter(|i| !counted[*i]) {
                 weights[i..(i + ORDER + 1).min(r.count)].fill(0.0);
             }
             weights
         })
     }
 
-    /// Residuals of all records, actuator by actuator, with zeros where nothing was measured.
+    /// Residuals of all records, actuator by actuator, with zeros where nothing was measured or the actuator
+    /// stood still.
     pub fn silenced(&self, mut residual: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        for row in &mut residual {
+        for (j, row) in residual.iter_mut().enumerate() {
             for (k, r) in self.records.iter().enumerate() {
-                let of = row[self.span(k)].iter_mut().zip(&r.measured);
+                let counted = r.counted(j);
+                let of = row[self.span(k)].iter_mut().zip(counted.iter());
                 of.filter(|(_, m)| !**m).for_each(|(v, _)| *v = 0.0);
             }
         }
@@ -231,9 +236,7 @@ impl<'a> Data<'a> {
                 continue;
             }
             let column = self.own(j, |_, v| sign(v, T.reversals.sharp * self.speed[j]));
-            let to = self.w[j].col_mut(c);
-            let to = to.try_as_col_major_mut().expect("column major");
-            to.as_slice_mut().copy_from_slice(&column);
+            self.w[j].write(c).copy_from_slice(&column);
         }
     }
 
@@ -285,7 +288,7 @@ impl<'a> Data<'a> {
 
     /// A modelled signal of all records as the torque channel would show it, whitened.
     pub fn modelled(&self, j: usize, x: &[f64]) -> Vec<f64> {
-        if self.window <= 0.0 {
+        if self.window == 0.0 {
             return self.whiten(j, x);
         }
         self.whiten(j, &self.windowed(x))
@@ -294,7 +297,7 @@ impl<'a> Data<'a> {
     /// A modelled signal of all records as the torque channel would show it: passes of the kernel
     /// `[c/2, 1 − c, c/2]` until their variances sum to the window's.
     pub fn windowed(&self, x: &[f64]) -> Vec<f64> {
-        let passes = (self.window / T.window.pass).ceil() as usize;
+        let passes = (self.window.abs() / T.window.pass).ceil() as usize;
         let mut x = x.to_vec();
         if passes == 0 {
             return x;
@@ -346,10 +349,9 @@ impl<'a> Data<'a> {
     /// and its standard deviation.
     pub(super) fn add_nuisances(&mut self, all: &[(&str, Column, f64)]) {
         self.w.par_iter_mut().enumerate().for_each(|(j, w)| {
-            let (rows, p) = (w.nrows(), w.ncols());
-            w.resize_with(rows, p + all.len(), |i, c| {
-                all[c - p].1.get(j).map_or(0.0, |values| values[i])
-            });
+            for (_, column, _) in all {
+                w.push(column.get(j).map(<[f64]>::to_vec));
+            }
         });
         for (name, _, spread) in all {
             self.parameters.push(Parameter {
@@ -368,8 +370,9 @@ impl<'a> Data<'a> {
     pub fn model_torque(&self, phi: &[f64]) -> Vec<Vec<f64>> {
         (0..self.joints())
             .map(|j| {
-                let y = &self.w[j] * faer::ColRef::from_slice(phi);
-                (0..self.rows()).map(|i| y[i] + self.known[j][i]).collect()
+                let mut y = self.w[j].times(phi);
+                y.iter_mut().zip(&self.known[j]).for_each(|(y, k)| *y += k);
+                y
             })
             .collect()
     }
@@ -386,10 +389,7 @@ impl<'a> Data<'a> {
             })
             .collect();
         let mut torque: Vec<Vec<f64>> = (0..self.joints())
-            .map(|j| {
-                let y = &self.w[j] * faer::ColRef::from_slice(&bodies);
-                (0..self.rows()).map(|i| y[i]).collect()
-            })
+            .map(|j| self.w[j].times(&bodies))
             .collect();
         for k in 0..self.records.len() {
             let Some(load) = self.load(k, phi) else {

@@ -1,5 +1,6 @@
 //! Effects in the result: members of the set that was fitted, and what could stand in their place.
 
+use super::carried::Carried;
 use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value};
 use super::evidence::{Evidence, Projected};
 use super::interval;
@@ -24,6 +25,8 @@ pub struct Finding {
     pub place: Place,
     /// shape
     pub shape: Shape,
+    /// names of the records that it is in; empty for all
+    pub records: Vec<String>,
     /// coefficients
     pub eta: Vec<f64>,
     /// 0 to 1; see [`Finding::is_claim`]
@@ -32,8 +35,8 @@ pub struct Finding {
     pub explains: f64,
     /// 95 % interval of it
     pub interval: [f64; 2],
-    /// share of the gap on holdout records
-    pub holdout: f64,
+    /// share of the gap on holdout records, where there are any
+    pub holdout: Option<f64>,
     /// share of the effect that the nominal model cannot absorb
     pub visibility: f64,
     /// the most that a decoy, the effect moved in time, gains of its own over what the effect gains; of
@@ -128,11 +131,12 @@ fn members(
             joints: names(cx, &c.place),
             place: c.place,
             shape: c.shape.clone(),
+            records: Vec::new(),
             eta: c.eta.clone(),
             confidence: m.confidence,
             explains: m.explains,
             interval,
-            holdout: m.holdout,
+            holdout: data.predicts().then_some(m.holdout),
             visibility: m.visibility,
             decoys: m.decoys,
             unsteady: m.unsteady,
@@ -174,11 +178,12 @@ fn rivals(
                 joints: names(cx, &r.place),
                 place: r.place,
                 shape: r.shape.clone(),
+                records: Vec::new(),
                 eta: r.eta.clone(),
                 confidence: (main.confidence * r.weight).min(T.rivals.believed),
                 explains: main.explains * (1.0 - r.loss).clamp(0.0, 1.0),
                 interval: main.interval.map(|v| v * (1.0 - r.loss).clamp(0.0, 1.0)),
-                holdout: main.holdout * (1.0 - r.loss).clamp(0.0, 1.0),
+                holdout: main.holdout.map(|h| h * (1.0 - r.loss).clamp(0.0, 1.0)),
                 visibility: of.visibility,
                 decoys: None,
                 unsteady: None,
@@ -196,4 +201,54 @@ fn rivals(
             });
         }
     }
+}
+
+/// The load that some records carry, with what the fit beside the effects says of it.
+pub fn carried(
+    evidence: &Evidence,
+    cx: &Context,
+    phi: &[f64],
+    load: &Carried,
+    effects: &[Box<dyn Effect>],
+) -> Option<Finding> {
+    let data = evidence.data;
+    let at = data.free_load?;
+    let effect = effects.iter().find(|e| e.card().name == "payload")?;
+    let card = effect.card();
+    let place = *effect.places(cx).first()?;
+    let eta = phi.get(at..at + 10)?.to_vec();
+    let scale = super::verdict::inflation(&evidence.residual(&[], &evidence.fit(&[])), data.fitted);
+    let std: Vec<f64> = (at..at + 10).map(|i| scale * evidence.std(i)).collect();
+    // a load without weight is none
+    let shape = effect.shapes(cx, &place).pop()?;
+    let values = effect.values(cx, &estimate(place, &shape, &eta, &std));
+    let mut of: Vec<(usize, String)> = data
+        .records
+        .iter()
+        .filter(|r| load.records.contains(&r.order))
+        .map(|r| (r.order, r.name.clone()))
+        .collect();
+    of.sort();
+    Some(Finding {
+        effect: card.name,
+        title: card.title,
+        equation: card.equation,
+        separated_by: card.separated_by,
+        joints: names(cx, &place),
+        place,
+        shape,
+        records: of.into_iter().map(|r| r.1).collect(),
+        eta,
+        confidence: load.confidence,
+        explains: load.explains,
+        interval: [0.0, 1.0],
+        holdout: None,
+        visibility: 1.0,
+        decoys: Some(load.decoys),
+        unsteady: Some(load.unsteady),
+        values,
+        same: Vec::new(),
+        member: true,
+        frozen: true,
+    })
 }

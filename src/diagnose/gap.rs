@@ -39,33 +39,38 @@ pub struct Shares {
 }
 
 /// Energy of a whitened residual above the noise in one record of one actuator: what repeats, and
-/// what does not. The residual is zero where nothing was measured.
-pub fn excess(record: &Series, e: &[f64]) -> (f64, f64) {
-    let n = record.sound() as f64;
+/// what does not. The residual is zero where nothing was measured or the actuator stood.
+pub fn excess(record: &Series, j: usize, e: &[f64]) -> (f64, f64) {
+    let counted = record.counted(j);
+    let sound = record.counts(j);
+    let n = sound as f64;
+    if sound == 0 {
+        return (0.0, 0.0);
+    }
     let Some(cycle) = record.cycle else {
         let total: f64 = e.iter().map(|v| v * v).sum();
         return ((total - n).max(-T.measure.negative * n), 0.0);
     };
     let periods = record.periods() as f64;
-    let mean = record.period_mean(e);
+    let mean = record.period_mean(j, e);
     let between: f64 = e
         .iter()
         .enumerate()
-        .filter(|(i, _)| record.measured[*i])
+        .filter(|(i, _)| counted[*i])
         .map(|(i, v)| (v - mean[i % cycle]).powi(2))
         .sum();
-    let free = record.freedoms();
+    let free = record.freedoms(j);
     let variance = between / free.max(1) as f64;
     // a phase of the period counts by how often it was measured
     let mut often = vec![0usize; cycle];
-    for i in (0..e.len()).filter(|i| record.measured[*i]) {
+    for i in (0..e.len()).filter(|i| counted[*i]) {
         often[i % cycle] += 1;
     }
     let part = |(v, n): (&f64, &usize)| v * v * (*n as f64 / periods);
     let power: f64 = mean.iter().zip(&often).map(part).sum();
-    let repeating = periods * power - variance * (record.sound() - free) as f64;
+    let repeating = periods * power - variance * (sound - free) as f64;
     // slow changes stand out at the lowest lines; what is broad must exceed the noise clearly
-    let slow = match between_periods(record, e) {
+    let slow = match between_periods(record, j, e) {
         Some(x) => {
             let s = spectrum(&x);
             let low =
@@ -97,8 +102,8 @@ pub fn energies(
             let mut sum = [0.0; 2];
             for (k, r) in data.records.iter().enumerate() {
                 if pick(r) {
-                    let (a, b) = excess(r, &residual[j][data.span(k)]);
-                    sum[0] += a - data.noise[j].excess * r.sound() as f64;
+                    let (a, b) = excess(r, j, &residual[j][data.span(k)]);
+                    sum[0] += a - data.noise[j].excess * r.counts(j) as f64;
                     sum[1] += b;
                 }
             }
@@ -120,17 +125,17 @@ pub fn joints(
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| pick(r)) {
                 let e = &residual[j][data.span(k)];
                 sum += e.iter().map(|v| v * v).sum::<f64>();
-                count += r.sound() as f64;
+                count += r.counts(j) as f64;
                 // relative errors below about 20 Hz, torque and residual filtered alike
                 let w = ((T.measure.low_pass / r.dt).round() as usize).max(1);
                 let low = |x: &[f64]| -> f64 { triangle(x, w).iter().map(|v| v * v).sum() };
                 filtered += low(e);
-                torque += low(&r.silenced(r.torque(j)));
+                torque += low(&r.silenced(j, r.torque(j)));
             }
             let noise = data.noise[j].std;
             JointGap {
                 joint: names[j].name.clone(),
-                rms: (sum / count - noise * noise * (1.0 + data.noise[j].excess))
+                rms: (sum / f64::max(count, 1.0) - noise * noise * (1.0 + data.noise[j].excess))
                     .max(0.0)
                     .sqrt(),
                 noise,
@@ -156,13 +161,13 @@ pub fn shares(data: &Data, residual: &[Vec<f64>]) -> Shares {
         };
         any = true;
         let symmetric = is_odd(r);
-        for e in residual {
+        for (j, e) in residual.iter().enumerate() {
             let e = &e[data.span(k)];
-            let (a, b) = excess(r, e);
+            let (a, b) = excess(r, j, e);
             repeating += a.max(0.0);
             other += b;
             if symmetric {
-                let mean = r.period_mean(e);
+                let mean = r.period_mean(j, e);
                 let half = cycle / 2;
                 // noise of the mean period, half of it in either part
                 let periods = r.periods() as f64;
@@ -236,8 +241,9 @@ pub fn bound(data: &Data, residual: &[Vec<f64>]) -> Option<f64> {
         for pass in 0..2 {
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| r.fit) {
                 let (q, v) = r.state(j);
+                let counted = r.counted(j);
                 let rows = e[data.span(k)].iter().enumerate();
-                for (i, x) in rows.filter(|(i, _)| r.measured[*i]) {
+                for (i, x) in rows.filter(|(i, _)| counted[*i]) {
                     let side = part(k, i, r);
                     let b = bin(q[i], v[i]);
                     if pass == 0 {

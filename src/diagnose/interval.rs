@@ -31,17 +31,21 @@ pub fn explained(
     for (k, r) in data.records.iter().enumerate().filter(|(_, r)| r.fit) {
         let size = ((block / r.dt).round() as usize).max(1);
         let span = data.span(k);
+        let counted: Vec<_> = (0..data.joints()).map(|j| r.counted(j)).collect();
         for from in span.clone().step_by(size) {
             let part = from..(from + size).min(span.end);
             let energy = |x: &[Vec<f64>]| -> f64 {
                 let row = |x: &Vec<f64>| x[part.clone()].iter().map(|v| v * v).sum::<f64>();
                 x.iter().map(row).sum()
             };
-            let noise: f64 = data.noise.iter().map(|n| 1.0 + n.excess).sum();
             let gone = energy(without) - energy(with);
             let at = part.start - span.start..part.end - span.start;
-            let sound = r.measured[at].iter().filter(|m| **m).count();
-            blocks.push([gone, energy(total) - noise * sound as f64]);
+            let noise = data.noise.iter().zip(&counted).map(|(n, counted)| {
+                let sound = counted[at.clone()].iter().filter(|m| **m).count();
+                (1.0 + n.excess) * sound as f64
+            });
+            let noise: f64 = noise.sum();
+            blocks.push([gone, energy(total) - noise]);
         }
     }
     let ratio = |sum: [f64; 2]| sum[0] / sum[1].max(1e-9);

@@ -30,10 +30,11 @@ fn finding(f: &Finding) -> Value {
     json!({
         "effect": f.effect,
         "joints": f.joints,
+        "records": f.records,
         "confidence": number(f.confidence),
         "explains": number(f.explains),
         "explains_interval": numbers(&f.interval),
-        "holdout_shrink": number(f.holdout),
+        "holdout_shrink": f.holdout.map(number),
         "visibility": number(f.visibility),
         "decoys": f.decoys.map(number),
         "unsteady": f.unsteady.map(number),
@@ -163,10 +164,23 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         },
         "findings": d.findings.iter().map(finding).collect::<Vec<_>>(),
         "unexplained": number(d.unexplained),
-        "holdout_shrink": number(1.0 - d.holdout[1] / d.holdout[0].max(1e-9)),
+        "holdout_shrink": d.holdout.map(|[a, b]| number(1.0 - b / a.max(1e-9))),
+        "at_rest": d.at_rest.iter().map(|r| json!({
+            "record": r.record,
+            "use": if r.fit { "fit" } else { "holdout" },
+            "all": r.all,
+            "seconds": number(r.seconds),
+            "of": number(r.of),
+            "torque_changes": r.pushed.iter().map(|(joint, std, unit)| json!({
+                "joint": joint, "std": number(*std), "unit": unit,
+            })).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
         "records": records,
         "untestable": d.untestable.iter().map(|(effect, place, v)| json!({
             "effect": effect, "joints": place, "visibility": number(*v),
+        })).collect::<Vec<_>>(),
+        "ruled_out": d.ruled_out.iter().map(|r| json!({
+            "effect": r.effect, "joints": r.joints, "why": r.why,
         })).collect::<Vec<_>>(),
         "forward_simulation": forward(d),
         "prior_surprise": numbers(&d.surprise),

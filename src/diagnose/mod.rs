@@ -22,6 +22,8 @@
 //!
 //! The method with its equations is in `docs/diagnosis-method.md`.
 
+pub(crate) mod at_rest;
+pub(crate) mod carried;
 #[doc(hidden)]
 pub mod catalogue;
 pub(crate) mod closeness;
@@ -58,12 +60,13 @@ pub(crate) mod traces;
 pub(crate) mod verdict;
 pub(crate) mod window;
 
+pub use at_rest::AtRest;
 pub use catalogue::{Place, Shape, Value};
 pub use finding::Finding;
 pub use gap::JointGap;
 pub use improve::Improved;
 pub use next::Proposal;
-pub use result::{Diagnosis, RecordGap};
+pub use result::{Diagnosis, RecordGap, RuledOut};
 pub use settings::Settings;
 #[doc(hidden)]
 pub use traces::Trace;
@@ -109,7 +112,7 @@ pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
         let wider = e.project(&[data.curvature(&model)]);
         let found = e.fit(&[&wider]).eta[0];
         drop(e);
-        data.window = (data.window + found).clamp(0.0, T.window.widest);
+        data.window = window(data.window + found);
         if pass == 0 {
             let residual = data.gap_to(&model);
             data.limit_excess(&residual);
@@ -159,6 +162,12 @@ pub fn of_logs(
 ) -> Result<Diagnosis> {
     progress("noise and nominal model");
     let mut data = prepare(plant, logs)?;
+    let carried = carried::find(&mut data)?;
+    let stated = carried.as_ref().map(|c| c.stated(logs));
+    let logs = stated.as_deref().unwrap_or(logs);
+    if stated.is_some() {
+        data = prepare(plant, logs)?;
+    }
     let effects = catalogue::all();
     closeness::tighten(&mut data, &effects)?;
     let data = data;
@@ -176,7 +185,9 @@ pub fn of_logs(
     let phi_after = evidence.parameters(&members, &fit);
     let frozen = data.gap_to(&data.model_torque(&evidence.phi));
     let [refit, after] = [&[][..], &members].map(|set| evidence.torque_left(set));
-    let findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
+    let mut findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
+    let fitted = |r: &Series| r.fit;
+    let residual_gap = gap::joints(&data, &refit, fitted);
     progress("forward simulation");
     let added = forward::effects_torque(&cx, &effects, &decision.members);
     let held = controller::identify(&data, &evidence.phi);
@@ -184,29 +195,56 @@ pub fn of_logs(
     let unknowns = &phi_after[..plant.parameters().len()];
     let (improved, mut warnings) = improve::improve(&evidence, &cx, &effects, unknowns, &findings);
     warnings.extend(payload::warnings(logs));
+    let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
+    let at_rest = at_rest::find(&data, &units);
+    warnings.extend(at_rest::warnings(&at_rest));
+    let verdict = match (data.moves(), &carried) {
+        // nothing was compared
+        (false, _) => Verdict::Unknown,
+        (true, None) => honest(decision.verdict, &residual_gap),
+        (true, Some(load)) => {
+            let body = finding::carried(&evidence, &cx, &phi_after, load, effects.as_slice());
+            findings.splice(0..0, body);
+            match honest(decision.verdict, &residual_gap) {
+                Verdict::NoGap => Verdict::Explained,
+                Verdict::Unknown => Verdict::PartlyExplained,
+                other => other,
+            }
+        }
+    };
     let next = settings.next.then(|| {
         progress("next experiment");
         next::propose(&evidence, &cx, &effects, &list, &findings, settings)
     });
-    let fitted = |r: &Series| r.fit;
     let scaled = result::scaled(&data, &refit);
     Ok(Diagnosis {
         robot: plant.name().to_string(),
         joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
-        units: (0..data.joints()).map(|j| cx.torque_unit(j)).collect(),
-        verdict: decision.verdict,
+        units,
+        verdict,
         findings,
         frozen: gap::joints(&data, &frozen, fitted),
-        refit: gap::joints(&data, &refit, fitted),
+        refit: residual_gap,
         explained: gap::joints(&data, &after, fitted),
         shares: gap::shares(&data, &scaled),
-        bound: gap::bound(&data, &scaled),
+        bound: match data.records.iter().any(|r| r.fit && r.cycle.is_some()) {
+            true => gap::bound(&data, &scaled),
+            // tried on other periods, of which there are none
+            false => None,
+        },
         records: result::record_gaps(&data, &phi_after, [&frozen, &refit, &after]),
-        holdout: decision.holdout,
-        unexplained: decision.unexplained,
+        holdout: data.predicts().then_some(decision.holdout),
+        moves: data.moves(),
+        at_rest,
+        unexplained: if data.moves() {
+            decision.unexplained
+        } else {
+            1.0
+        },
         traces: traces::traces(&data, &refit, &after),
         noise_source: result::noise_source(&data).into(),
         untestable: result::untestable(&data, &list, &effects),
+        ruled_out: result::ruled_out(&data, &list, &effects),
         phi: unknowns.to_vec(),
         improved,
         next: next.flatten(),
@@ -216,4 +254,23 @@ pub fn of_logs(
         closeness: data.closeness,
         window: data.window,
     })
+}
+
+/// `no_gap` only where the refit leaves no more than a sound model does on any joint, counted as the report
+/// counts it: `unknown` otherwise.
+fn honest(verdict: Verdict, refit: &[JointGap]) -> Verdict {
+    let left = |g: &JointGap| (g.rms / g.noise.max(1e-300)).powi(2);
+    match verdict == Verdict::NoGap && refit.iter().any(|g| left(g) > T.gap.left) {
+        true => Verdict::Unknown,
+        false => verdict,
+    }
+}
+
+/// The variance of the window beyond plus and minus one sample, from an estimate: that of an instant where the
+/// estimate is nearer to it.
+fn window(found: f64) -> f64 {
+    match found < -0.5 * T.window.instant {
+        true => -T.window.instant,
+        false => found.clamp(0.0, T.window.widest),
+    }
 }

@@ -52,16 +52,17 @@ pub fn spectrum(x: &[f64]) -> Vec<f64> {
 }
 
 /// Residual with the mean over periods taken away, scaled to the variance of one sample, zero where
-/// nothing was measured; `None` where the record does not repeat.
-pub fn between_periods(record: &Series, x: &[f64]) -> Option<Vec<f64>> {
+/// nothing was measured or actuator `j` stood; `None` where the record does not repeat.
+pub fn between_periods(record: &Series, j: usize, x: &[f64]) -> Option<Vec<f64>> {
     let cycle = record.cycle?;
     let periods = record.periods();
-    let scale = match record.sound() == record.count {
+    let (counted, sound) = (record.counted(j), record.counts(j));
+    let scale = match sound == record.count {
         true => (periods as f64 / (periods - 1) as f64).sqrt(),
-        false => (record.sound() as f64 / record.freedoms().max(1) as f64).sqrt(),
+        false => (sound as f64 / record.freedoms(j).max(1) as f64).sqrt(),
     };
-    let mean = record.period_mean(x);
-    let apart = |(i, v): (usize, &f64)| match record.measured[i] {
+    let mean = record.period_mean(j, x);
+    let apart = |(i, v): (usize, &f64)| match counted[i] {
         true => scale * (v - mean[i % cycle]),
         false => 0.0,
     };
@@ -135,7 +136,7 @@ impl Noise {
             }
             weight += *sound as f64;
         }
-        s.iter_mut().for_each(|v| *v /= weight);
+        s.iter_mut().for_each(|v| *v /= weight.max(1.0));
         flat_below(&mut s, dt);
         Self::new(s, Source::Periods)
     }
@@ -148,6 +149,19 @@ impl Noise {
         let scale = (stated / self.std).powi(2);
         self.torque.iter_mut().for_each(|v| *v *= scale);
         self.std = stated;
+        self.filter = predictor(&self.torque);
+    }
+
+    /// No less than `least`, N m or N: white noise in its place where it is below that.
+    pub fn at_least(&mut self, least: f64) {
+        if self.std >= least || self.torque.is_empty() {
+            return;
+        }
+        self.torque
+            .iter_mut()
+            .for_each(|v| *v = v.max(least * least));
+        let power = self.torque.iter().sum::<f64>() / self.torque.len() as f64;
+        self.std = power.sqrt();
         self.filter = predictor(&self.torque);
     }
 

@@ -15,21 +15,43 @@ impl Data<'_> {
         let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
         let used = || self.records.iter().filter(|r| r.fit || !repeats);
         let parts: Vec<(Vec<f64>, usize)> = used()
-            .filter_map(|r| Some((between_periods(r, r.torque(j))?, r.sound())))
+            .filter_map(|r| Some((between_periods(r, j, r.torque(j))?, r.counts(j))))
             .collect();
         let dt = used().find(|r| r.cycle.is_some()).map(|r| r.dt);
         if let Some(dt) = dt {
             let mut noise = Noise::from_periods(&parts, dt);
             noise.limit(self.plant.actuators()[j].torque_noise);
+            noise.at_least(self.least_noise(j));
             let excess = self.position_excess(j);
             noise.with_excess(&excess);
             return noise;
         }
-        // without repetition: the torque above the band of the motion
-        let longest = self.records.iter().max_by_key(|r| r.count);
+        // without repetition: the torque above the band of the motion, where the actuator moves
+        let longest = self.records.iter().max_by_key(|r| r.counts(j));
         // `prepare` refuses an experiment without a record to fit to
         let r = longest.expect("there are records");
-        Noise::from_residual(r.torque(j), r.dt, T.noise.above * r.band)
+        let x = match longest_run(&r.counted(j)) {
+            run if run.len() >= 2 * LINES => &r.torque(j)[run],
+            _ => r.torque(j),
+        };
+        let mut noise = Noise::from_residual(x, r.dt, T.noise.above * r.band);
+        noise.at_least(self.least_noise(j));
+        noise
+    }
+
+    /// Least noise of an actuator: a share of the torques in the fitted records. A simulator's log has none at all, and
+    /// what its steps leave would be a gap.
+    fn least_noise(&self, j: usize) -> f64 {
+        let (mut power, mut count) = (0.0, 0.0f64);
+        for r in self.records.iter().filter(|r| r.fit) {
+            let counted = r.counted(j);
+            let kept = r.torque(j).iter().zip(counted.iter()).filter(|(_, c)| **c);
+            kept.for_each(|(v, _)| {
+                power += v * v;
+                count += 1.0;
+            });
+        }
+        T.noise.of_torque * (power / count.max(1.0)).sqrt()
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.
@@ -48,21 +70,42 @@ impl Data<'_> {
         out
     }
 
+    /// The residual of an actuator in the fitted records: with zeros where nothing was measured, scaled to the
+    /// power of what was; without the rows at its ends and between where the actuator stood.
+    fn counted_residual(&self, j: usize, residual: &[f64]) -> Vec<f64> {
+        let (mut e, mut count) = (Vec::new(), 0);
+        for (k, r) in self.records.iter().enumerate().filter(|(_, r)| r.fit) {
+            let piece = &residual[self.span(k)];
+            match r.standing.is_empty() {
+                true => e.extend_from_slice(piece),
+                false => {
+                    // the rows that count, joined: their seams are few
+                    let counted = r.counted(j);
+                    let kept = piece.iter().zip(counted.iter()).filter(|(_, c)| **c);
+                    e.extend(kept.map(|(v, _)| *v));
+                }
+            }
+            count += r.counts(j);
+        }
+        if count < e.len() {
+            let scale = (e.len() as f64 / count.max(1) as f64).sqrt();
+            e.iter_mut().for_each(|v| *v *= scale);
+        }
+        e
+    }
+
     /// The same limited by what a residual shows.
     pub fn limit_excess(&mut self, residual: &[Vec<f64>]) {
         for j in 0..self.joints() {
             if self.noise[j].source != Source::Periods {
                 let r = &self.records[0];
                 let (dt, band) = (r.dt, T.noise.above * r.band);
-                let mut e = residual[j][..self.fitted].to_vec();
-                let fits = self.records.iter().filter(|r| r.fit);
-                let sound: usize = fits.map(Series::sound).sum();
-                if sound < self.fitted {
-                    // the power of what was measured
-                    let scale = (self.fitted as f64 / sound.max(1) as f64).sqrt();
-                    e.iter_mut().for_each(|v| *v *= scale);
+                let e = self.counted_residual(j, &residual[j]);
+                if !e.is_empty() {
+                    self.noise[j] = Noise::from_residual(&e, dt, band);
+                    let least = self.least_noise(j);
+                    self.noise[j].at_least(least);
                 }
-                self.noise[j] = Noise::from_residual(&e, dt, band);
                 continue;
             }
             let mut seen = vec![0.0; LINES + 1];
@@ -75,7 +118,7 @@ impl Data<'_> {
                 for (s, v) in seen.iter_mut().zip(spectrum(piece)) {
                     *s += v * piece.len() as f64;
                 }
-                weight += self.records[k].sound() as f64;
+                weight += self.records[k].counts(j) as f64;
             }
             let possible = self.position_excess(j);
             let excess: Vec<f64> = (0..=LINES)
@@ -85,7 +128,8 @@ impl Data<'_> {
                         l.saturating_sub(T.noise.excess),
                         (l + T.noise.excess).min(LINES),
                     );
-                    let mut near: Vec<f64> = seen[lo..=hi].iter().map(|v| v / weight).collect();
+                    let mut near: Vec<f64> =
+                        seen[lo..=hi].iter().map(|v| v / weight.max(1.0)).collect();
                     near.sort_by(f64::total_cmp);
                     let seen = near[near.len() / 2] - self.noise[j].torque[l];
                     possible[l].min(seen.max(0.0))
@@ -94,4 +138,17 @@ impl Data<'_> {
             self.noise[j].with_excess(&excess);
         }
     }
+}
+
+/// The longest run of samples that count.
+fn longest_run(counted: &[bool]) -> std::ops::Range<usize> {
+    let (mut best, mut from) = (0..0, 0);
+    for (i, c) in counted.iter().enumerate() {
+        match c {
+            true if i + 1 - from > best.len() => best = from..i + 1,
+            true => {}
+            false => from = i + 1,
+        }
+    }
+    best
 }

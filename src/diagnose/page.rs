@@ -17,18 +17,33 @@ use crate::report::joints;
 /// Verdict in one sentence.
 pub fn sentence(d: &Diagnosis) -> (Tone, String) {
     let claims: Vec<&Finding> = claims(d);
+    let sure = !claims.is_empty() && claims.iter().all(|f| f.confidence >= T.confidence.sure);
+    if !d.moves {
+        return (
+            Tone::Bad,
+            "Unknown: nothing moves in the fitted records, and a model can only be judged in motion. What happened at \
+             rest is in the warnings."
+                .into(),
+        );
+    }
     let names = || -> String {
-        let each = |f: &&Finding| match f.joints.is_empty() {
-            true => f.title.to_string(),
-            false => format!("{} on {}", f.title, f.joints.join(" and ")),
+        let plain = |f: &&Finding| match (f.records.is_empty(), f.joints.is_empty()) {
+            (false, _) => format!("{} in {}", f.title, f.records.join(" and ")),
+            (true, true) => f.title.to_string(),
+            (true, false) => format!("{} on {}", f.title, f.joints.join(" and ")),
+        };
+        // each with how sure it is, unless all are
+        let each = |f: &&Finding| match sure {
+            true => plain(f),
+            false => format!("{} ({} sure)", plain(f), percent(f.confidence)),
         };
         match (claims.as_slice(), d.findings.first()) {
             ([], Some(f)) if !f.same.is_empty() => format!(
                 "{} or {}, which these records do not tell apart",
-                each(&f),
+                plain(&f),
                 f.same.join(" or ").replace('_', " ")
             ),
-            ([], Some(f)) => format!("probably {} ({} sure)", each(&f), percent(f.confidence)),
+            ([], Some(f)) => format!("{} ({} sure)", plain(&f), percent(f.confidence)),
             _ => claims.iter().map(each).collect::<Vec<_>>().join("; "),
         }
     };
@@ -38,14 +53,23 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             Tone::Good,
             "No gap: what is left after ordinary corrections of the parameters is noise.".into(),
         ),
-        Verdict::Explained => (
+        Verdict::Explained if sure => (
             Tone::Good,
             format!("Explained: {}. {left} of the gap stays.", names()),
+        ),
+        Verdict::Explained => (
+            Tone::Fair,
+            format!("Probably explained: {}. {left} of the gap stays.", names()),
         ),
         Verdict::PartlyExplained => (
             Tone::Fair,
             format!(
-                "Partly explained: {}. Something remains: {left} of the gap.",
+                "{}: {}. Something remains: {left} of the gap.",
+                if sure {
+                    "Partly explained"
+                } else {
+                    "Probably explained in part"
+                },
                 names()
             ),
         ),

@@ -42,7 +42,15 @@ pub fn check(plant: &Plant, logs: &[log::Record]) -> Result<()> {
             plant.name()
         )));
     }
-    let unknown = |r: &&log::Record| r.payload == Payload::Unknown;
+    let free: Vec<&log::Record> = logs.iter().filter(|r| is_free(r.payload)).collect();
+    if let Some(other) = free.iter().find(|r| r.payload != free[0].payload) {
+        return Err(Error::Infeasible(format!(
+            "{} and {}: they carry different loads that are not known in full, and a diagnosis estimates one; state mass \
+             and com of one of them (excite load tells them)",
+            free[0].name, other.name
+        )));
+    }
+    let unknown = |r: &&log::Record| is_free(r.payload);
     let fitted = |r: &log::Record| r.purpose == Purpose::Fit;
     match logs.iter().find(unknown) {
         Some(held) if !logs.iter().filter(unknown).any(fitted) => Err(Error::Infeasible(format!(
@@ -56,7 +64,7 @@ pub fn check(plant: &Plant, logs: &[log::Record]) -> Result<()> {
 
 /// What the payloads leave open.
 pub fn warnings(logs: &[log::Record]) -> Vec<Warning> {
-    let open = |r: &log::Record| r.payload == Payload::Unknown;
+    let open = |r: &log::Record| is_free(r.payload);
     match logs.iter().any(open) && !logs.iter().any(|r| r.payload == Payload::None) {
         true => vec![Warning::new(
             WarningKind::NominalModelAssumed,
@@ -68,9 +76,19 @@ pub fn warnings(logs: &[log::Record]) -> Vec<Warning> {
     }
 }
 
+/// Whether a load is estimated: all of it, or where its mass is and how it is spread.
+pub fn is_free(payload: Payload) -> bool {
+    matches!(payload, Payload::Unknown | Payload::Known { com: None, .. })
+}
+
 /// The load that a payload states.
 fn stated(payload: Payload) -> Option<Load> {
-    let Payload::Known { mass, com, inertia } = payload else {
+    let Payload::Known {
+        mass,
+        com: Some(com),
+        inertia,
+    } = payload
+    else {
         return None;
     };
     let [xx, xy, xz, yy, yz, zz] = inertia.unwrap_or_default();
@@ -88,17 +106,7 @@ impl Data<'_> {
         let Some(tool) = self.plant.tool().filter(|_| !self.records.iter().all(none)) else {
             return Ok(());
         };
-        let n = self.joints();
-        let mut columns: Vec<Vec<Vec<f64>>> = vec![vec![vec![0.0; self.rows()]; n]; 10];
-        for (k, r) in self.records.iter().enumerate().filter(|(_, r)| !none(r)) {
-            let w = self.plant.body_columns(tool, &r.x)?;
-            for (c, column) in columns.iter_mut().enumerate() {
-                for (j, row) in column.iter_mut().enumerate() {
-                    let tau: Vec<f64> = (0..r.count).map(|i| w[(j * r.count + i, c)]).collect();
-                    averaged(&tau, &mut row[self.start[k]..self.start[k + 1]]);
-                }
-            }
-        }
+        let mut columns = self.load_columns(tool, |r| !none(r))?;
         for k in 0..self.records.len() {
             let Some(load) = stated(self.records[k].payload) else {
                 continue;
@@ -117,7 +125,7 @@ impl Data<'_> {
                 rows: rows.iter().cloned().enumerate().collect(),
             })
             .collect();
-        let unknown = |k: usize| self.records[k].payload == Payload::Unknown;
+        let unknown = |k: usize| is_free(self.records[k].payload);
         if (0..self.records.len()).any(unknown) {
             for rows in columns.iter_mut().flatten() {
                 for k in (0..self.records.len()).filter(|k| !unknown(*k)) {
@@ -145,6 +153,29 @@ impl Data<'_> {
         Ok(())
     }
 
+    /// Torques of the ten parameters of a load on body `tool`, by parameter and actuator, on the rows of the records
+    /// that `carry` it.
+    ///
+    /// # Errors
+    /// Poses that cannot be reached.
+    pub(super) fn load_columns(
+        &self,
+        tool: usize,
+        carry: impl Fn(&Series) -> bool,
+    ) -> Result<Vec<Vec<Vec<f64>>>> {
+        let mut columns = vec![vec![vec![0.0; self.rows()]; self.joints()]; 10];
+        for (k, r) in self.records.iter().enumerate().filter(|(_, r)| carry(r)) {
+            let w = self.plant.body_columns(tool, &r.x)?;
+            for (c, column) in columns.iter_mut().enumerate() {
+                for (j, row) in column.iter_mut().enumerate() {
+                    let tau: Vec<f64> = (0..r.count).map(|i| w[(j * r.count + i, c)]).collect();
+                    averaged(&tau, &mut row[self.start[k]..self.start[k + 1]]);
+                }
+            }
+        }
+        Ok(columns)
+    }
+
     /// Starts from the load that a fit has found in the place of none, so that the gap of the model as it
     /// is does not contain it.
     pub fn start_from_load(&mut self, phi: &[f64]) {
@@ -158,7 +189,7 @@ impl Data<'_> {
     pub fn load(&self, k: usize, phi: &[f64]) -> Option<Load> {
         match self.records[k].payload {
             Payload::None => None,
-            Payload::Unknown => {
+            free if is_free(free) => {
                 let at = self.free_load?;
                 phi.get(at..at + 10)?.try_into().ok()
             }

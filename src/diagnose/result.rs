@@ -1,5 +1,6 @@
 //! Result of a diagnosis.
 
+use super::at_rest::AtRest;
 use super::catalogue::Effect;
 use super::data::Data;
 use super::finding::Finding;
@@ -8,12 +9,13 @@ use super::gap::{self, JointGap, Shares};
 use super::improve::Improved;
 use super::next::{INVISIBLE, Proposal};
 use super::noise::Source;
+use super::payload::is_free;
 use super::prior::Closeness;
 use super::search::Candidate;
+use super::thresholds::THRESHOLDS as T;
 use super::traces::Trace;
 use super::verdict::Verdict;
 use crate::error::Warning;
-use crate::log::Payload;
 use crate::signals::series::Series;
 
 /// Energy of the gap in one record before and after the set, in units of the noise variance a sample.
@@ -55,12 +57,16 @@ pub struct Diagnosis {
     pub shares: Shares,
     /// records
     pub records: Vec<RecordGap>,
-    /// gap energy on holdout before and after
-    pub holdout: [f64; 2],
+    /// gap energy on holdout before and after; `None` without a holdout record in which anything moves
+    pub holdout: Option<[f64; 2]>,
+    /// whether anything moves in the fitted records
+    pub moves: bool,
+    /// records in which the robot stands for a while, or all the time
+    pub at_rest: Vec<AtRest>,
     /// share of the gap that stays
     pub unexplained: f64,
     /// share of the gap that any function of the state could explain, by cross-validation between
-    /// periods of state bins; `None` where there is nothing to explain
+    /// periods of state bins; `None` where there is nothing to explain, or no record repeats
     pub bound: Option<f64>,
     /// figures
     pub traces: Vec<Trace>,
@@ -68,6 +74,8 @@ pub struct Diagnosis {
     pub noise_source: String,
     /// effects that this motion cannot show: name, joint, visibility
     pub untestable: Vec<(&'static str, String, f64)>,
+    /// effects that fit with values that no machine can have
+    pub ruled_out: Vec<RuledOut>,
     /// parameters of the nominal model as fitted beside the effects
     pub phi: Vec<f64>,
     /// the model with the effects that were claimed
@@ -100,7 +108,7 @@ pub fn scaled(data: &Data, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
 pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec<RecordGap> {
     let all = residuals.map(|e| scaled(data, e));
     let remarks = |r: &Series| {
-        let unknown = r.payload == Payload::Unknown;
+        let unknown = is_free(r.payload);
         let load = data.free_load_in_words(phi).filter(|_| unknown);
         r.remarks.iter().cloned().chain(load).collect()
     };
@@ -113,8 +121,8 @@ pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec
             joints: (0..data.joints())
                 .map(|j| {
                     std::array::from_fn(|i| {
-                        let (a, b) = gap::excess(r, &all[i][j][data.span(k)]);
-                        ((a + b) / r.sound() as f64 - data.noise[j].excess).max(0.0)
+                        let (a, b) = gap::excess(r, j, &all[i][j][data.span(k)]);
+                        ((a + b) / r.counts(j).max(1) as f64 - data.noise[j].excess).max(0.0)
                     })
                 })
                 .collect(),
@@ -122,6 +130,44 @@ pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec
             remarks: remarks(r),
         })
         .collect()
+}
+
+/// An effect that would explain the records best with values that no machine can have.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct RuledOut {
+    /// name, as in `formats.md`
+    pub effect: &'static str,
+    /// name in sentences
+    pub title: &'static str,
+    /// names of the actuators; empty for the whole robot
+    pub joints: Vec<String>,
+    /// why no machine has it
+    pub why: String,
+}
+
+/// Effects that were ruled out, the ones that would explain most first: those that gain as much as an effect
+/// must, and at least a tenth of the best.
+pub fn ruled_out(data: &Data, list: &[Candidate], effects: &[Box<dyn Effect>]) -> Vec<RuledOut> {
+    let best = list.iter().map(|c| c.gain).fold(0.0, f64::max);
+    let least = (T.search.worth_a_word * best).max(T.entry.gain * data.fitted as f64);
+    let mut all: Vec<(&Candidate, &String, f64)> = list
+        .iter()
+        .filter_map(|c| c.ruled_out.as_ref().map(|(why, gain)| (c, why, *gain)))
+        .filter(|(.., gain)| *gain > least)
+        .collect();
+    all.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let names = data.plant.actuators();
+    let one = |(c, why, _): &(&Candidate, &String, f64)| {
+        let card = effects[c.effect].card();
+        let named = c.place.named().into_iter();
+        RuledOut {
+            effect: card.name,
+            title: card.title,
+            joints: named.map(|j| names[j].name.clone()).collect(),
+            why: (*why).clone(),
+        }
+    };
+    all.iter().take(T.search.words).map(one).collect()
 }
 
 /// Effects that the nominal model absorbs to more than 99 % in this motion.

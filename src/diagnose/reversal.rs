@@ -18,7 +18,6 @@ impl Data<'_> {
             return;
         }
         let mut nuisances = Vec::new();
-        let measured = self.measured();
         for (j, actuator) in self.plant.actuators().into_iter().enumerate() {
             let coulomb = actuator.terms[2].abs();
             if coulomb == 0.0 {
@@ -28,7 +27,8 @@ impl Data<'_> {
                 false => self.doubt(j, coulomb),
                 true => self.sticking(j),
             };
-            let kept = self.weights[j].iter_mut().zip(&measured);
+            let counted = self.counted(j);
+            let kept = self.weights[j].iter_mut().zip(&counted);
             kept.for_each(|(w, m)| *w *= m);
             let sharp = T.reversals.sharp * self.speed[j];
             // tanh of three widths: any rounding in between is close to a sum of them
@@ -49,7 +49,10 @@ impl Data<'_> {
     /// positions show, and the model is off by a share `κ` of the friction.
     fn doubt(&self, j: usize, coulomb: f64) -> Vec<f64> {
         let near = T.reversals.near;
-        let doubt = (T.reversals.bent * coulomb / self.noise[j].std.max(1e-300)).powi(2);
+        let noise = self.noise[j].std.max(1e-300);
+        let doubt = (T.reversals.bent * coulomb / noise).powi(2);
+        // where the velocity is within its noise even the sign of friction is open
+        let open = (coulomb / noise).powi(2);
         self.each(|r, _| {
             let v = r.state(j).1;
             let mut away = vec![f64::INFINITY; v.len()];
@@ -61,8 +64,13 @@ impl Data<'_> {
                     away[k] = away[k].min(distance);
                 }
             }
-            let b = away.iter().map(|d| (2.0 - d / near).clamp(0.0, 1.0));
-            b.map(|b| 1.0 / (1.0 + doubt * b).sqrt()).collect()
+            let blind = T.reversals.blind * r.velocity_noise(j);
+            let of = |(d, v): (&f64, &f64)| {
+                let b = (2.0 - d / near).clamp(0.0, 1.0);
+                let c = (2.0 - v.abs() / blind.max(1e-300)).clamp(0.0, 1.0);
+                1.0 / (1.0 + doubt * b + open * c).sqrt()
+            };
+            away.iter().zip(v).map(of).collect()
         })
     }
 

@@ -4,6 +4,7 @@ use super::catalogue::{Context, Effect, Place, Shape};
 use super::column::Column;
 use super::evidence::{Evidence, Fit, Projected};
 use super::thresholds::THRESHOLDS as T;
+use crate::report::format::significant;
 use rayon::prelude::*;
 
 /// An effect at a place with its best shape.
@@ -21,6 +22,8 @@ pub struct Candidate {
     pub gain: f64,
     /// coefficients then
     pub eta: Vec<f64>,
+    /// why it is none, where its best fit is one that no machine can have, and by how much `χ²` would fall
+    pub ruled_out: Option<(String, f64)>,
 }
 
 impl Candidate {
@@ -47,7 +50,7 @@ fn try_shape(
     beside: &[&Projected],
     before: &Fit,
     draft: bool,
-) -> Option<(f64, Vec<f64>, Projected)> {
+) -> Option<Tried> {
     let columns = effect.columns(cx, place, shape, draft);
     if columns.is_empty() || columns.iter().any(|c| c.rows.is_empty()) {
         return None;
@@ -58,11 +61,61 @@ fn try_shape(
     let fit = evidence.fit(&set);
     let eta = fit.eta[fit.eta.len() - columns.len()..].to_vec();
     let gain = fit.gain - before.gain;
-    let gain = match gain.is_finite() && effect.plausible(cx, place, shape, &eta) {
-        true => gain,
-        false => 0.0,
+    let able = gain.is_finite() && effect.plausible(cx, place, shape, &eta);
+    let why = match able {
+        true => impossible(cx, effect, place, shape, &eta, (!draft).then_some(&columns)),
+        false => None,
     };
-    Some((gain, eta, projected))
+    Some(Tried {
+        gain: if able && why.is_none() { gain } else { 0.0 },
+        ruled_out: why.map(|why| (why, gain)),
+        eta,
+        projected,
+    })
+}
+
+/// An effect with one shape, beside a set.
+struct Tried {
+    gain: f64,
+    eta: Vec<f64>,
+    projected: Projected,
+    ruled_out: Option<(String, f64)>,
+}
+
+/// Why no machine has these coefficients: by the rules of the effect, or because it would need more torque than
+/// its drive has. The torque is that of a sine of the same power, over the fitted rows that count.
+fn impossible(
+    cx: &Context,
+    effect: &dyn Effect,
+    place: &Place,
+    shape: &Shape,
+    eta: &[f64],
+    columns: Option<&Vec<Column>>,
+) -> Option<String> {
+    let why = effect.impossible(cx, place, shape, eta);
+    let (Some(columns), None) = (columns, &why) else {
+        return why;
+    };
+    place.named().into_iter().find_map(|j| {
+        let most = effect.most() * cx.effort(j)?;
+        let rows = cx.data.fitted;
+        let (mut power, mut count) = (0.0, 0.0f64);
+        for i in (0..rows).filter(|i| cx.data.weights[j][*i] > 0.0) {
+            let at = |(c, e): (&Column, &f64)| c.get(j).map_or(0.0, |v| v[i] * e);
+            power += columns.iter().zip(eta).map(at).sum::<f64>().powi(2);
+            count += 1.0;
+        }
+        let torque = (2.0 * power / count.max(1.0)).sqrt();
+        (torque > most).then(|| {
+            format!(
+                "it would make {} {} on {}, whose drive has {}",
+                significant(torque, 3),
+                cx.torque_unit(j),
+                cx.name(j),
+                significant(cx.effort(j).unwrap_or(most), 3)
+            )
+        })
+    })
 }
 
 /// The best shape of an effect at a place, beside a set.
@@ -77,33 +130,41 @@ pub fn best_shape(
 ) -> Option<Candidate> {
     let effect = effects[which].as_ref();
     let grid = effect.shapes(cx, place);
-    let best_of = |shapes: &[Shape]| -> Option<(f64, Shape)> {
+    // the best that a machine can have, and the best that none can
+    type Best = [Option<(f64, Shape, Option<String>)>; 2];
+    let best_of = |shapes: &[Shape]| -> Option<Best> {
         let columns = |s: &Shape| effect.columns(cx, place, s, true);
         let sets: Vec<_> = shapes.iter().map(columns).collect();
         let empty = |s: &Vec<Column>| s.is_empty() || s.iter().any(|c| c.rows.is_empty());
         if sets.iter().any(empty) {
             return None;
         }
-        let mut best: Option<(f64, Shape)> = None;
+        let mut best: Best = [None, None];
         for (projected, shape) in evidence.project_all(&sets).iter().zip(shapes) {
             let mut set = beside.to_vec();
             set.push(projected);
             let fit = evidence.fit(&set);
             let eta = &fit.eta[fit.eta.len() - projected.z.len()..];
             let gain = fit.gain - before.gain;
-            if gain.is_finite()
-                && effect.plausible(cx, place, shape, eta)
-                && best.as_ref().is_none_or(|b| gain > b.0)
-            {
-                best = Some((gain, shape.clone()));
+            let able = gain.is_finite() && effect.plausible(cx, place, shape, eta);
+            let why = effect.impossible(cx, place, shape, eta).filter(|_| able);
+            let of = &mut best[usize::from(why.is_some())];
+            if able && of.as_ref().is_none_or(|b| gain > b.0) {
+                *of = Some((gain, shape.clone(), why));
             }
         }
-        best
+        Some(best)
     };
     let parts: Vec<_> = grid.par_chunks(8).with_max_len(1).map(best_of).collect();
-    let better = |a: (f64, Shape), b: (f64, Shape)| if b.0 > a.0 { b } else { a };
-    let best = parts.into_iter().flatten().reduce(better);
-    let (gain, mut shape) = best?;
+    let [best, none] = [0, 1].map(|which| {
+        let all = parts.iter().flatten().filter_map(|b| b[which].clone());
+        all.reduce(|a, b| if b.0 > a.0 { b } else { a })
+    });
+    // what no machine can have is kept only to be said
+    let gain = best.as_ref().map_or(0.0, |b| b.0);
+    let said = none.and_then(|(more, shape, why)| (more > gain).then_some(((why?, more), shape)));
+    let (said, instead) = said.unzip();
+    let mut shape = best.map(|b| b.1).or(instead)?;
     // between grid points
     if gain > T.shapes.refined {
         let mut top = gain;
@@ -137,8 +198,8 @@ pub fn best_shape(
                         let tried =
                             try_shape(evidence, cx, effect, place, &next, beside, before, true);
                         match tried {
-                            Some((gain, ..)) if gain > top * T.shapes.better => {
-                                top = gain;
+                            Some(t) if t.gain > top * T.shapes.better => {
+                                top = t.gain;
                                 shape = next;
                             }
                             _ => break,
@@ -148,15 +209,15 @@ pub fn best_shape(
             }
         }
     }
-    let (gain, eta, projected) =
-        try_shape(evidence, cx, effect, place, &shape, beside, before, false)?;
+    let last = try_shape(evidence, cx, effect, place, &shape, beside, before, false)?;
     Some(Candidate {
         effect: which,
         place: *place,
         shape,
-        projected,
-        gain,
-        eta,
+        projected: last.projected,
+        gain: last.gain,
+        eta: last.eta,
+        ruled_out: last.ruled_out.or(said),
     })
 }
 

@@ -16,7 +16,7 @@ mod verdict;
 pub use gap::{Forward, Gap, Improved, Measure};
 pub use gate::Gate;
 pub use motions::{Motions, Next};
-pub use records::{Closeness, Controller, Load, Noise, Prior, Reversals, Window};
+pub use records::{Carried, Closeness, Controller, Load, Noise, Prior, Rest, Reversals, Window};
 pub use search::{Search, Shapes};
 pub use verdict::{Confidence, Decoys, Entry, Hidden, Interval, Matters, Rivals};
 
@@ -25,6 +25,10 @@ pub use verdict::{Confidence, Decoys, Entry, Hidden, Interval, Matters, Rivals};
 pub struct Thresholds {
     /// noise of the measured torque
     pub noise: Noise,
+    /// robots that stand
+    pub rest: Rest,
+    /// a load that some records carry
+    pub carried: Carried,
     /// what the torque channel makes of a signal
     pub window: Window,
     /// what a log may have about a reversal
@@ -72,6 +76,8 @@ pub struct Thresholds {
 /// The values that are used.
 pub const THRESHOLDS: Thresholds = Thresholds {
     noise: records::NOISE,
+    rest: records::REST,
+    carried: records::CARRIED,
     window: records::WINDOW,
     reversals: records::REVERSALS,
     prior: records::PRIOR,

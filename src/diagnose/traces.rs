@@ -32,7 +32,7 @@ pub fn traces(data: &Data, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Trace
             let n = r.cycle.unwrap_or(r.count);
             let part = |x: &[f64]| -> Vec<f64> {
                 match r.cycle {
-                    Some(_) => r.period_mean(&x[data.span(0)]),
+                    Some(_) => r.period_mean(j, &x[data.span(0)]),
                     None => x[data.span(0)].to_vec(),
                 }
             };
@@ -58,9 +58,10 @@ pub fn traces(data: &Data, before: &[Vec<f64>], after: &[Vec<f64>]) -> Vec<Trace
             for k in order {
                 let r = &data.records[k];
                 let step = r.cycle.unwrap_or(r.count.div_ceil(4));
+                let counted = r.counted(j);
                 for (i, piece) in before[j][data.span(k)].chunks(step).enumerate() {
                     let later = &after[j][data.span(k)][i * step..][..piece.len()];
-                    let of = &r.measured[i * step..][..piece.len()];
+                    let of = &counted[i * step..][..piece.len()];
                     let sound = of.iter().filter(|m| **m).count().max(1);
                     let rms =
                         |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / sound as f64).sqrt();

@@ -97,8 +97,10 @@ pub fn decide(
     );
     members.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
 
-    // an effect that hides in the parameters is measured against the frozen model
-    let hides = members.iter().any(|m| m.frozen);
+    // what is claimed decides what the verdict is measured against: an effect that hides in the parameters
+    // against the frozen model
+    let claims = |m: &Member| m.together >= T.confidence.claim;
+    let hides = members.iter().any(|m| m.frozen && claims(m));
     let whole = |fit: bool| st.above(&st.gap(&evidence.r, fit), fit);
     let [base, base_held] = match hides {
         true => [whole(true), whole(false)],
@@ -107,7 +109,7 @@ pub fn decide(
     let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
     let surprising = surprise > T.hidden.surprise + T.hidden.per_parameter * free(&st);
     // a set that cannot be told apart explains as well as its one right member
-    let claimed = members.iter().any(|m| m.together >= T.confidence.claim);
+    let claimed = members.iter().any(claims);
     let verdict = match (stands_out(&st, &before) || surprising, claimed) {
         (false, false) => Verdict::NoGap,
         (_, false) => Verdict::Unknown,

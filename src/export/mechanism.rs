@@ -6,7 +6,7 @@ use super::{base_name, possible, rpy};
 use crate::error::{Error, Result, number};
 use crate::mechanism::loops::{Closure, Coincide, Frame};
 use crate::mechanism::{Mechanism, Source};
-use crate::robot::{Inertia, JointTerm, Robot};
+use crate::robot::{Inertia, JointTerm, Prior, Robot};
 use nalgebra::{Matrix3, Vector3};
 use toml::{Table, Value};
 
@@ -28,6 +28,9 @@ pub fn toml(mechanism: &Mechanism, robot: &Robot, urdf: &str) -> Result<String> 
         false => toml::from_str(&mechanism.text).map_err(|_| none())?,
     };
     file.insert("name".into(), robot.name.clone().into());
+    if robot.prior == Prior::Identified {
+        file.insert("prior".into(), "identified".into());
+    }
     if robot.gravity != mechanism.robot.gravity {
         file.insert("gravity".into(), numbers(robot.gravity.as_slice()));
     }

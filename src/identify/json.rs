@@ -113,6 +113,7 @@ pub fn report(
             "unconstrained": pair(v.plain),
             "essential": pair(v.essential),
         },
+        "worse_than_nominal": super::doubts::predicts_worse(id).is_some(),
         "residual_goes_with": v.followers.iter().map(|f| json!({
             "joint": plant.actuators()[f.actuator].name, "what": f.what, "share": number(f.share),
         })).collect::<Vec<_>>(),

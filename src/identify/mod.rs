@@ -18,6 +18,7 @@
 pub(crate) mod aside;
 pub(crate) mod consistent;
 pub(crate) mod cross_validation;
+pub(crate) mod doubts;
 pub(crate) mod equations;
 pub(crate) mod essential;
 pub(crate) mod followers;
@@ -100,7 +101,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
     let models = [&normal.pi, &standard.pi, &essential.pi];
     let validation = validation::validate(&equations, models.map(Vec::as_slice))?;
 
-    Ok(Identification {
+    let mut found = Identification {
         std: normal.std(),
         predicted_std: uncertainty::predicted(plant, &fit.stacks())?,
         residual_covariance: weights::residual_covariance(&fit.stacks(), &normal.pi),
@@ -121,5 +122,8 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         validation,
         warnings,
         base,
-    })
+    };
+    let doubts = doubts::doubts(plant, &found);
+    found.warnings.extend(doubts);
+    Ok(found)
 }

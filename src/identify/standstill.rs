@@ -1,21 +1,16 @@
-//! Equations of joints that stand still.
+//! Equations of joints that stand still ([`crate::signals::standstill`]).
 //!
 //! The torque of a joint at rest differs from that of the rigid bodies by any friction up to the break-away
 //! value, while the column of Coulomb friction takes the sign of what little velocity the noise of the
-//! position makes. Neither is information. Where a joint with Coulomb friction is slower than three standard
-//! deviations of its velocity, or than a thousandth of its fastest, for more than half of what the filter
-//! sees, its equation is left out; those of the other joints stay. A reversal passes in less and is kept.
+//! position makes. Neither is information. Where a joint with Coulomb friction is slow for more than half of
+//! what the filter sees, its equation is left out; those of the other joints stay. A reversal passes in less and
+//! is kept.
 
 use super::stack::Stack;
 use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::JointTerm;
-use crate::signals::Prepared;
-
-/// Standard deviations of the velocity within which a joint may stand still.
-const SIGMAS: f64 = 3.0;
-/// Fraction of its fastest velocity below which a joint counts as standing.
-const SLOW: f64 = 1e-3;
+use crate::signals::{Prepared, standstill};
 
 /// The fit records without the equations of joints that stand still, and what was left out; `None` where
 /// there is nothing to leave out.
@@ -37,12 +32,16 @@ pub fn left_out(
     }
     let mut out: Vec<Stack> = fit.iter().map(|s| (*s).clone()).collect();
     for (s, p) in out.iter_mut().zip(prepared) {
-        let qd = plant.actuator_motion(&p.motion)?.qd;
+        let motion = plant.actuator_motion(&p.motion)?;
         for &a in &dry {
-            let v = &qd[a * p.count()..(a + 1) * p.count()];
-            let fastest = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-            let least = (SIGMAS * p.velocity_noise[a]).max(SLOW * fastest);
-            let still: Vec<f64> = v.iter().map(|x| f64::from(x.abs() <= least)).collect();
+            let row = a * p.count()..(a + 1) * p.count();
+            let joint = standstill::Joint {
+                position_noise: 0.0,
+                velocity_noise: p.velocity_noise[a],
+                motion: joints[a].motion,
+            };
+            let slow = standstill::slow(joint, &motion.q[row.clone()], &motion.qd[row]);
+            let still: Vec<f64> = slow.into_iter().map(f64::from).collect();
             if still.iter().all(|x| *x == 0.0) {
                 continue;
             }

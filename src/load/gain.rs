@@ -19,8 +19,9 @@ use super::weight::inflation;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Payload;
 use crate::plant::Plant;
-use faer::Mat;
 use faer::linalg::solvers::{DenseSolveCore, SolveLstsq};
+use faer::{Mat, Side};
+use rayon::prelude::*;
 
 /// Factors of the measured torques.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -31,29 +32,68 @@ pub struct Gains {
     pub value: Vec<f64>,
     /// standard deviations
     pub std: Vec<f64>,
-    /// whether `k_j` differs from 1 by more than three of them, and was corrected
+    /// whether `k_j` differs from 1 by more than three of them
     pub corrected: Vec<bool>,
+    /// what the torques are divided by: `k_j` shrunk towards 1 by its uncertainty
+    pub used: Vec<f64>,
+    /// their standard deviations
+    pub used_std: Vec<f64>,
+    /// their covariance
+    #[serde(skip)]
+    pub covariance: Mat<f64>,
     /// what was found
     #[serde(skip)]
     pub warnings: Vec<Warning>,
 }
 
 impl Gains {
-    /// Divides the measured torques by the gains that are certain.
+    /// Divides the measured torques by the gains.
     pub fn correct(&self, records: &mut [Loaded]) {
-        for loaded in records {
-            let count = loaded.record.motion.count;
-            let scale = |torque: &mut [f64]| {
-                for (a, row) in torque.chunks_exact_mut(count).enumerate() {
-                    if self.corrected[a] {
-                        row.iter_mut().for_each(|t| *t /= self.value[a]);
-                    }
-                }
-            };
-            scale(&mut loaded.record.torque);
-            if let Some(p) = &mut loaded.record.periods {
-                p.torque.iter_mut().for_each(|t| scale(t));
+        divide(records, &self.used);
+    }
+
+    /// Covariance that the gains add to parameters that `estimate` finds from records whose torques are right, with
+    /// these parameters: one step along every column of a root of theirs.
+    ///
+    /// # Errors
+    /// As `estimate`.
+    pub(super) fn carried_over(
+        &self,
+        records: &[Loaded],
+        found: &[f64; 10],
+        estimate: impl Fn(&[Loaded]) -> Result<[f64; 10]> + Sync,
+    ) -> Result<Mat<f64>> {
+        let n = self.used.len();
+        let root = match self.covariance.llt(Side::Lower) {
+            Ok(f) => f.L().to_owned(),
+            Err(_) => Mat::from_fn(n, n, |i, k| if i == k { self.used_std[i] } else { 0.0 }),
+        };
+        let step = |k: usize| -> Result<[f64; 10]> {
+            let off: Vec<f64> = (0..n).map(|j| 1.0 + root[(j, k)] / self.used[j]).collect();
+            let mut moved = records.to_vec();
+            divide(&mut moved, &off);
+            let other = estimate(&moved)?;
+            Ok(std::array::from_fn(|i| other[i] - found[i]))
+        };
+        let all: Vec<[f64; 10]> = (0..n).into_par_iter().map(step).collect::<Result<_>>()?;
+        Ok(Mat::from_fn(10, 10, |i, k| {
+            all.iter().map(|d| d[i] * d[k]).sum()
+        }))
+    }
+}
+
+/// Divides the measured torques of every actuator.
+fn divide(records: &mut [Loaded], by: &[f64]) {
+    for loaded in records {
+        let count = loaded.record.motion.count;
+        let scale = |torque: &mut [f64]| {
+            for (row, by) in torque.chunks_exact_mut(count).zip(by) {
+                row.iter_mut().for_each(|t| *t /= by);
             }
+        };
+        scale(&mut loaded.record.torque);
+        if let Some(p) = &mut loaded.record.periods {
+            p.torque.iter_mut().for_each(|t| scale(t));
         }
     }
 }
@@ -62,10 +102,13 @@ impl Gains {
 const ROUNDS: [usize; 2] = [25, 2];
 /// Change of the gains at which it ends.
 const SETTLED: f64 = 1e-10;
-/// A gain is corrected where it differs from 1 by more than this many of its standard deviations …
+/// A gain is certain where it differs from 1 by more than this many of its standard deviations.
 const CERTAIN: f64 = 3.0;
-/// … and where its standard deviation is below this.
-const USEFUL: f64 = 0.2;
+/// How far the torque constant of a drive may be from its data sheet, standard deviation: a gain that the known load
+/// hardly tells stays at 1.
+const ORDINARY: f64 = 0.1;
+/// Correction that is worth a word.
+const SAID: f64 = 2e-3;
 
 /// Estimates the gains from the records with a known load and those without a load.
 ///
@@ -86,8 +129,27 @@ pub fn estimate(plant: &Plant, tool: usize, records: &[Loaded]) -> Result<Gains>
     let system = System::new(plant, tool, &used, true)?;
     let known = system.parts.iter().zip(&used);
     let known = known.map(|(part, loaded)| known_torque(part, loaded));
-    let (gain, std) = gauss_newton(&system, &known.collect::<Vec<_>>())?;
-    Ok(judged(plant, gain, std))
+    let weights = weights_of(&used);
+    let (gain, covariance) = gauss_newton(&system, &known.collect::<Vec<_>>(), &weights)?;
+    Ok(judged(plant, gain, covariance))
+}
+
+/// Of every record the place of its weight among those of which only the mass is known; weights of one mass are one.
+fn weights_of(records: &[&Loaded]) -> Vec<Option<usize>> {
+    let mut masses: Vec<f64> = Vec::new();
+    let mut place = |payload: Payload| match payload {
+        Payload::Known {
+            mass, com: None, ..
+        } => {
+            let at = masses.iter().position(|m| *m == mass);
+            Some(at.unwrap_or_else(|| {
+                masses.push(mass);
+                masses.len() - 1
+            }))
+        }
+        _ => None,
+    };
+    records.iter().map(|r| place(r.payload)).collect()
 }
 
 /// Torque of the known load of a record.
@@ -95,9 +157,10 @@ fn known_torque(part: &Part, loaded: &Loaded) -> Vec<f64> {
     let Payload::Known { mass, com, inertia } = loaded.payload else {
         return vec![0.0; part.y.len()];
     };
+    // of a weight the mass alone: where it is and how it is spread are unknowns
     let mut values = [0.0; 10];
     values[0] = mass;
-    values[1..4].copy_from_slice(&com);
+    values[1..4].copy_from_slice(&com.unwrap_or_default());
     values[4..].copy_from_slice(&inertia.unwrap_or_default());
     let phi = from_quantities(&values).0;
     (0..part.y.len())
@@ -113,10 +176,16 @@ struct State {
     sigma: Vec<f64>,
 }
 
-/// Gains and their standard deviations, by Gauss-Newton with the noise of each joint from what is left.
-fn gauss_newton(system: &System, known: &[Vec<f64>]) -> Result<(Vec<f64>, Vec<f64>)> {
+/// Gains and their covariance, by Gauss-Newton with the noise of each joint from what is left. `weights` are those of
+/// [`weights_of`].
+fn gauss_newton(
+    system: &System,
+    known: &[Vec<f64>],
+    weights: &[Option<usize>],
+) -> Result<(Vec<f64>, Mat<f64>)> {
     let na = system.actuators;
-    let others = system.deviations.len() + 3 * na * system.parts.len();
+    let weighed = weights.iter().flatten().max().map_or(0, |last| last + 1);
+    let others = system.deviations.len() + 3 * na * system.parts.len() + SPREAD * weighed;
     let mut state = State {
         gain: vec![1.0; na],
         rest: vec![0.0; others],
@@ -124,7 +193,7 @@ fn gauss_newton(system: &System, known: &[Vec<f64>]) -> Result<(Vec<f64>, Vec<f6
     };
     let [most, least] = ROUNDS;
     for round in 0..most {
-        let (a, y, model) = linearised(system, known, &state);
+        let (a, y, model) = linearised(system, known, weights, &state);
         let qr = a.qr();
         let step = qr.solve_lstsq(&y);
         let mut change = 0.0f64;
@@ -146,8 +215,9 @@ fn gauss_newton(system: &System, known: &[Vec<f64>]) -> Result<(Vec<f64>, Vec<f6
         if round > least && change < SETTLED {
             let thin = qr.thin_R();
             let covariance = (thin.transpose() * thin).partial_piv_lu().inverse();
-            let std = |j: usize| (covariance[(j, j)] * inflation(&left[j])).max(0.0).sqrt();
-            return Ok((state.gain, (0..na).map(std).collect()));
+            let wider: Vec<f64> = left.iter().map(|e| inflation(e).max(0.0).sqrt()).collect();
+            let own = |i: usize, k: usize| covariance[(i, k)] * wider[i] * wider[k];
+            return Ok((state.gain, Mat::from_fn(na, na, own)));
         }
         for (sigma, e) in state.sigma.iter_mut().zip(&left) {
             let square = e.iter().fold(0.0, |s, e| s + e * e);
@@ -161,10 +231,14 @@ fn gauss_newton(system: &System, known: &[Vec<f64>]) -> Result<(Vec<f64>, Vec<f6
     ))
 }
 
+/// Unknowns of a weight beside its mass: three first moments, six of the tensor.
+const SPREAD: usize = 9;
+
 /// Weighted rows about a state, right-hand side, and the torques without gain.
 fn linearised(
     system: &System,
     known: &[Vec<f64>],
+    weights: &[Option<usize>],
     state: &State,
 ) -> (Mat<f64>, Mat<f64>, Vec<f64>) {
     let (na, nd) = (system.actuators, system.deviations.len());
@@ -188,6 +262,13 @@ fn linearised(
             for f in 0..3 {
                 inner += state.rest[first + f] * part.friction[f][i];
                 a[(r, na + first + f)] = w * state.gain[j] * part.friction[f][i];
+            }
+            if let Some(weight) = weights[p] {
+                let first = nd + 3 * na * system.parts.len() + SPREAD * weight;
+                for c in 0..SPREAD {
+                    inner += state.rest[first + c] * part.tool[(i, 1 + c)];
+                    a[(r, na + first + c)] = w * state.gain[j] * part.tool[(i, 1 + c)];
+                }
             }
             a[(r, j)] = w * inner;
             y[(r, 0)] = w * (part.torque[i] - state.gain[j] * inner);
@@ -216,23 +297,43 @@ fn residuals(system: &System, gain: &[f64], model: &[f64]) -> Vec<Vec<f64>> {
     out
 }
 
-/// Which gains are certain enough to correct the torques with.
-fn judged(plant: &Plant, value: Vec<f64>, std: Vec<f64>) -> Gains {
+/// The gains as they are used. With `P = 0.1² 1` what drives ordinarily deviate by and `C` the covariance of the estimate,
+/// they are `1 + P (P + C)⁻¹ (k − 1)`, with the covariance `P − P (P + C)⁻¹ P`.
+fn judged(plant: &Plant, value: Vec<f64>, covariance: Mat<f64>) -> Gains {
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
-    let pairs = value.iter().zip(&std);
-    let corrected: Vec<bool> = pairs
-        .map(|(k, s)| (k - 1.0).abs() > CERTAIN * s && *s < USEFUL)
+    let n = joints.len();
+    let std: Vec<f64> = (0..n).map(|j| covariance[(j, j)].max(0.0).sqrt()).collect();
+    let prior = ORDINARY * ORDINARY;
+    let sum = Mat::from_fn(n, n, |i, k| {
+        covariance[(i, k)] + if i == k { prior } else { 0.0 }
+    });
+    let inverse = sum.partial_piv_lu().inverse();
+    let used: Vec<f64> = (0..n)
+        .map(|i| {
+            1.0 + (0..n)
+                .map(|k| prior * inverse[(i, k)] * (value[k] - 1.0))
+                .sum::<f64>()
+        })
         .collect();
-    let warnings = (0..joints.len())
-        .filter(|&j| corrected[j])
+    let left = Mat::from_fn(n, n, |i, k| {
+        let own = if i == k { prior } else { 0.0 };
+        own - 0.5 * prior * prior * (inverse[(i, k)] + inverse[(k, i)])
+    });
+    let used_std: Vec<f64> = (0..n).map(|j| left[(j, j)].max(0.0).sqrt()).collect();
+    let pairs = value.iter().zip(&std);
+    let corrected = pairs.map(|(k, s)| (k - 1.0).abs() > CERTAIN * s).collect();
+    let warnings = (0..n)
+        .filter(|&j| (used[j] - 1.0).abs() > SAID)
         .map(|j| {
             Warning::new(
                 WarningKind::DriveGainApplied,
                 joints[j].clone(),
                 format!(
-                    "measured torques are {:.3} ± {:.3} times what the known load tells; they were \
-                     divided by it",
-                    value[j], std[j]
+                    "measured torques are {:.3} ± {:.3} times what the known load tells (95 %); they were divided by {:.3}, \
+                     which is that drawn towards 1 by its uncertainty",
+                    value[j],
+                    1.96 * std[j],
+                    used[j]
                 ),
             )
         })
@@ -242,6 +343,9 @@ fn judged(plant: &Plant, value: Vec<f64>, std: Vec<f64>) -> Gains {
         value,
         std,
         corrected,
+        used,
+        used_std,
+        covariance: left,
         warnings,
     }
 }

@@ -27,6 +27,8 @@ pub struct Identified {
     pub gain: Option<Gains>,
     /// estimate that counts
     pub method: Method,
+    /// where the flange is in that frame, for the controllers: x y z, m, roll pitch yaw, rad
+    pub flange: [f64; 6],
     /// what was found on the way
     pub warnings: Vec<Warning>,
 }

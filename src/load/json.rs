@@ -1,7 +1,7 @@
 //! `load.json`.
 
 use super::body::LoadBody;
-use super::{Identified, Method};
+use super::{Identified, Method, controller};
 use serde_json::{Value, json};
 
 /// Which of mass, centre and tensor are known, from which of the ten are.
@@ -16,12 +16,32 @@ pub(super) fn known(body: &LoadBody) -> [bool; 10] {
     })
 }
 
+/// Which of mass, centre and tensor are determined: within half of the mass; a decimetre of the centre; and half of the
+/// tensor's size (that of its row and column), at 95 %.
+pub fn determined(body: &LoadBody) -> [bool; 10] {
+    const FAR: f64 = 0.1;
+    let (v, s, k) = (body.values(), body.stds(), known(body));
+    const PAIRS: [(usize, usize); 6] = [(4, 4), (4, 7), (4, 9), (7, 7), (7, 9), (9, 9)];
+    std::array::from_fn(|i| {
+        let size = match i {
+            0 => 0.5 * v[0].abs(),
+            1..=3 => FAR,
+            _ => {
+                let (a, b) = PAIRS[i - 4];
+                0.5 * (v[a] * v[b]).abs().sqrt()
+            }
+        };
+        k[i] && 1.96 * s[i] <= size
+    })
+}
+
 fn body(b: &LoadBody) -> Value {
     let (v, s, k) = (b.values(), b.stds(), known(b));
     let number = |i: usize, x: f64| match k[i] && x.is_finite() {
         true => json!(x),
         false => Value::Null,
     };
+    let sure = determined(b);
     let list = |range: std::ops::Range<usize>, x: &[f64; 10]| -> Vec<Value> {
         range.map(|i| number(i, x[i])).collect()
     };
@@ -29,6 +49,11 @@ fn body(b: &LoadBody) -> Value {
         "mass": { "value": number(0, v[0]), "std": number(0, s[0]) },
         "com": { "value": list(1..4, &v), "std": list(1..4, &s) },
         "inertia_com": { "value": list(4..10, &v), "std": list(4..10, &s) },
+        "determined": {
+            "mass": sure[0],
+            "com": sure[1..4],
+            "inertia_com": sure[4..],
+        },
         "parameters": b.inertia.0.to_vec(),
         "physically_consistent": b.consistent || b.projected,
         "projected": b.projected,
@@ -67,6 +92,13 @@ pub fn json(found: &Identified) -> Value {
     if let Some(g) = &found.gain {
         out["drive_gain"] = json!(g);
     }
+    let flange = &found.flange;
+    out["controllers"] = json!({
+        "flange": flange,
+        "franka_desk": controller::franka(&found.load().inertia, flange).ok(),
+        "urscript": controller::urscript(&found.load().inertia, flange).ok(),
+        "kuka": controller::kuka(&found.load().inertia, flange).ok(),
+    });
     out["warnings"] = json!(found.warnings);
     out
 }

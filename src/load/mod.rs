@@ -31,6 +31,8 @@
 
 #[doc(hidden)]
 pub mod body;
+#[doc(hidden)]
+pub mod controller;
 pub(crate) mod gain;
 pub(crate) mod identified;
 #[doc(hidden)]
@@ -106,7 +108,29 @@ pub fn from_records(
              error of that is booked on the load",
         ));
     }
-    let one_step = one_step::estimate(plant, tool, &records, settings)?;
+    let mut one_step = one_step::estimate(plant, tool, &records, settings)?;
+    match &gain {
+        // the gains are uncertain, and so is what they scale
+        Some(gains) => {
+            let plain = Settings {
+                consistent: false,
+                ..settings.clone()
+            };
+            let estimate = |records: &[Loaded]| -> Result<[f64; 10]> {
+                let found = one_step::estimate(plant, tool, records, &plain)?;
+                Ok(found.load.inertia.0)
+            };
+            let found = estimate(&records)?;
+            one_step.load.covariance += gains.carried_over(&records, &found, estimate)?;
+        }
+        None => warnings.push(Warning::new(
+            WarningKind::DriveGainAssumed,
+            "payload",
+            "no record with a known load tells the drive gains: where torques come from motor currents, a gain that is off \
+             by one percent makes the mass one percent wrong, whatever its ± says; record a weight of known mass \
+             (payload = { mass = 5.0 }), or compare with a scale",
+        )),
+    }
     warnings.extend(one_step.warnings.iter().cloned());
     let (two_step, no_two_step) = published(plant, tool, &records, settings)?;
     Ok(Identified {
@@ -118,6 +142,7 @@ pub fn from_records(
         no_two_step,
         gain,
         method: settings.method,
+        flange: settings.flange,
         warnings,
     })
 }

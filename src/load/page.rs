@@ -2,7 +2,8 @@
 
 use super::Identified;
 use super::body::LoadBody;
-use super::json::known;
+use super::controller;
+use super::json::{determined, known};
 use crate::report::format::{percent, significant, with_unit};
 use crate::report::html::{self, Section, Tone};
 use crate::report::joints;
@@ -28,9 +29,12 @@ fn cell(b: &LoadBody, i: usize) -> Markup {
     if !k[i] {
         return html! { "not identifiable" };
     }
+    if !determined(b)[i] {
+        return html! { "not determined" };
+    }
     let unit = ["kg", "mm", "kg m²"][usize::from(i > 0) + usize::from(i > 3)];
     let factor = if (1..4).contains(&i) { 1e3 } else { 1.0 };
-    html! { (significant(v[i] * factor, 5)) " ± " (significant(s[i] * factor, 2)) " " (unit) }
+    html! { (significant(v[i] * factor, 5)) " ± " (significant(1.96 * s[i] * factor, 2)) " " (unit) }
 }
 
 /// The report as one HTML file.
@@ -48,7 +52,7 @@ pub fn html(found: &Identified) -> String {
         true => format!(
             "The load is {} ± {} kg with its centre of mass at ({}, {}, {}) mm in the frame of {}.{}",
             significant(v[0], 5),
-            significant(s[0], 2),
+            significant(1.96 * s[0], 2),
             significant(1e3 * v[1], 4),
             significant(1e3 * v[2], 4),
             significant(1e3 * v[3], 4),
@@ -86,19 +90,22 @@ pub fn html(found: &Identified) -> String {
                 vec![
                     html! { (g.joints[j]) },
                     html! { (significant(g.value[j], 5)) },
-                    html! { (significant(g.std[j], 2)) },
-                    html! { (if g.corrected[j] { "corrected" } else { "left at 1" }) },
+                    html! { (significant(1.96 * g.std[j], 2)) },
+                    html! { (significant(g.used[j], 5)) " ± " (significant(1.96 * g.used_std[j], 2)) },
                 ]
             })
             .collect();
         sections.push(Section::new(
             "Drive gains",
             html! {
-                (html::table(&["drive", "measured over true torque", "standard deviation", ""], &[3], &rows))
-                p { "From the records with a known load (Gautier & Briot 2014)." }
+                (html::table(&["joint", "measured over true torque", "± at 95 %", "used"], &[], &rows))
+                p { "From the records with a known load (Gautier & Briot 2014). Torques are divided by the gain that is used: the estimate \
+                     drawn towards 1 by its uncertainty, as far as drives ordinarily differ from their data sheet (10 %). What stays uncertain \
+                     of them is in the ± of the load." }
             },
         ));
     }
+    sections.push(controllers(found));
     sections.push(joints::order(found.joints.iter().map(String::as_str)));
     let records: Vec<&str> = found
         .one_step
@@ -111,6 +118,34 @@ pub fn html(found: &Identified) -> String {
         &format!("records {}", records.join(", ")),
         (tone, &verdict),
         &sections,
+    )
+}
+
+/// The load as controllers take it.
+fn controllers(found: &Identified) -> Section {
+    let load = &found.load().inertia;
+    let texts = [
+        ("URScript", controller::urscript(load, &found.flange)),
+        ("KUKA load data", controller::kuka(load, &found.flange)),
+        (
+            "Franka Desk, endeffector-config.json",
+            controller::franka(load, &found.flange).map(|v| v.to_string()),
+        ),
+    ];
+    let at = found.flange.map(|x| significant(x, 4)).join(", ");
+    Section::new(
+        "For the controller of the robot",
+        html! {
+            @for (name, text) in texts {
+                h3 { (name) }
+                @match text {
+                    Ok(text) => pre { (text) },
+                    Err(why) => p { (why.to_string()) },
+                }
+            }
+            p { "In the frame of the flange, which is taken at (" (at) ") in the frame of " (found.frame) " (x y z in m, roll pitch yaw \
+                 in rad; --flange)." }
+        },
     )
 }
 
@@ -129,13 +164,13 @@ fn tiles(found: &Identified) -> Section {
             "mass".to_string(),
             format!(
                 "± {} %",
-                significant(100.0 * s[0] / v[0].abs().max(1e-12), 2)
+                significant(196.0 * s[0] / v[0].abs().max(1e-12), 2)
             ),
         ),
         (
-            with_unit(1e3 * far, 2, "mm"),
+            with_unit(1.96e3 * far, 2, "mm"),
             "least certain coordinate of the centre".to_string(),
-            "standard deviation".to_string(),
+            "± at 95 %".to_string(),
         ),
         (
             significant(found.one_step.condition, 3),
@@ -184,7 +219,7 @@ fn methods(found: &Identified) -> Section {
         (html::table(&head, &[], &rows))
         p {
             "Centre of mass and tensor in the frame of " (found.frame) ", the tensor about the centre of \
-             mass; ± is one standard deviation. Differences of the tensor are relative to the geometric \
+             mass; ± is the 95 % interval. Differences of the tensor are relative to the geometric \
              mean of the moments of its row and column."
         }
         @match two {
@@ -225,7 +260,7 @@ fn torques(found: &Identified) -> Section {
             }
         })
         .collect();
-    let rows = (1..=na).map(|a| format!("drive {a}")).collect();
+    let rows = found.joints.clone();
     let svg = time_series(
         "Torque or force that the load takes, measured and identified",
         rows,
@@ -269,7 +304,7 @@ fn speeds(found: &Identified) -> Section {
                 Series::line(line, Colour::VERMILLION)
             };
             Panel {
-                title: format!("drive {}", a + 1),
+                title: found.joints[a].clone(),
                 x: Axis::linear("velocity, rad/s or m/s"),
                 y: Axis::linear("residual, N m or N"),
                 rules: vec![Rule {
@@ -331,7 +366,7 @@ fn friction(found: &Identified) -> Section {
             };
             rows.push(vec![
                 html! { (r.name) },
-                html! { (a + 1) },
+                html! { (found.joints[a]) },
                 html! { (significant(f.coulomb, 3)) },
                 range(&f.coulomb_periods),
                 html! { (significant(f.viscous, 3)) },
@@ -349,7 +384,7 @@ fn friction(found: &Identified) -> Section {
     }
     let head = [
         "record",
-        "drive",
+        "joint",
         "Coulomb",
         "Coulomb, period by period",
         "viscous",

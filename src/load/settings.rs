@@ -40,6 +40,8 @@ pub struct Settings {
     pub standstill: Option<f64>,
     /// pressure outside of the cylinders, Pa; 0 where the logged pressures are relative to it
     pub atmosphere: f64,
+    /// where the flange is in the frame of the body that carries the load: x y z, m, roll pitch yaw, rad
+    pub flange: [f64; 6],
     /// preparation of the signals
     pub signals: signals::Settings,
 }
@@ -53,6 +55,7 @@ impl Default for Settings {
             consistent: true,
             standstill: None,
             atmosphere: 101_325.0,
+            flange: [0.0; 6],
             signals: signals::Settings::default(),
         }
     }

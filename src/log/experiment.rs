@@ -67,7 +67,7 @@ enum PayloadEntry {
 struct PayloadBody {
     mass: f64,
     #[serde(default)]
-    com: [f64; 3],
+    com: Option<[f64; 3]>,
     inertia: Option<[f64; 6]>,
 }
 
@@ -214,6 +214,7 @@ impl Entry {
                 let finite = body
                     .com
                     .iter()
+                    .flatten()
                     .chain(body.inertia.iter().flatten())
                     .all(|x| x.is_finite());
                 if !(body.mass.is_finite() && body.mass > 0.0 && finite) {
@@ -222,6 +223,11 @@ impl Entry {
                          numbers finite",
                         body.mass, body.com
                     ));
+                }
+                if body.com.is_none() && body.inertia.is_some() {
+                    return Err(
+                        "the payload's inertia is about its centre of mass: state com, too".into(),
+                    );
                 }
                 Ok(Payload::Known {
                     mass: body.mass,

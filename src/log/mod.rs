@@ -60,8 +60,8 @@ pub enum Payload {
     Known {
         /// kg
         mass: f64,
-        /// centre of mass in the frame of the last link (platform), m
-        com: [f64; 3],
+        /// centre of mass in the frame of the last link (platform), m; `None`: a weight of which only the mass is known
+        com: Option<[f64; 3]>,
         /// tensor about the centre of mass, xx, xy, xz, yy, yz, zz, kg m²
         inertia: Option<[f64; 6]>,
     },

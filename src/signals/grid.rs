@@ -35,11 +35,15 @@ impl<'a> Source<'a> {
     }
 }
 
+/// Highest rate of the grid, Hz: of what lies above the band of any motion nothing is learnt, and time and memory
+/// grow with it. Logs of 2.5 kHz come to 312.5 Hz, those of 1 kHz and 500 Hz to 250 Hz.
+pub(super) const RATE: f64 = 320.0;
+
 /// Samples of a period at intervals of `mean` or multiples of it: far above the band nothing is learnt
 /// from more of them.
 pub(super) fn thinned(period: f64, mean: f64) -> usize {
     let mut per = (period / mean).round() as usize;
-    while per as f64 / period > 600.0 {
+    while per as f64 / period > RATE {
         per /= 2;
     }
     per
@@ -103,9 +107,17 @@ pub(super) fn resample(
             if lo >= 1 && lo + 2 <= last && w != 0.0 {
                 let (a, b, c, d) = (x[lo - 1], x[lo], x[lo + 1], x[lo + 2]);
                 let h = w.clamp(-0.5, 1.5);
-                b + 0.5
-                    * h
-                    * (c - a + h * (2.0 * a - 5.0 * b + 4.0 * c - d + h * (3.0 * (b - c) + d - a)))
+                // tangents at b and c, times the interval between them
+                let [before, here, after] = match stamped {
+                    true => [0, 1, 2].map(|i| t[lo + i] - t[lo + i - 1]),
+                    false => [1.0; 3],
+                };
+                let tangent = |left: f64, right: f64, [l, r]: [f64; 2]| {
+                    here * (left / l * r + right / r * l) / (l + r)
+                };
+                let m0 = tangent(b - a, c - b, [before, here]);
+                let m1 = tangent(c - b, d - c, [here, after]);
+                b + h * (m0 + h * (3.0 * (c - b) - 2.0 * m0 - m1 + h * (2.0 * (b - c) + m0 + m1)))
             } else {
                 x[lo] + w.clamp(-1.0, 2.0) * (x[lo + 1] - x[lo])
             }

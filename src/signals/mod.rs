@@ -35,6 +35,7 @@ mod grid;
 mod prepare;
 pub(crate) mod repeats;
 pub(crate) mod series;
+pub(crate) mod standstill;
 pub(crate) mod wiener;
 
 #[doc(hidden)]

@@ -4,9 +4,10 @@
 //! Derivatives come from a Fourier series where the motion repeats ([`wiener`](super::wiener)); what the encoder
 //! cannot resolve is left out of it. Samples that were not measured are marked.
 
-use super::grid::{Source, lattice, repeats, resample, thinned, third_difference};
+use super::grid::{RATE, Source, lattice, repeats, resample, thinned, third_difference};
 use super::repeats::{freedoms, means, repeat, scatter, widen};
-use super::wiener::{BAND, differentiated, half_width};
+use super::wiener::{BAND, SMOOTH, differentiated, half_width};
+use super::{cutoff, standstill};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::log::{self, Payload, Purpose};
@@ -39,6 +40,8 @@ pub struct Series {
     pub tau: Vec<f64>,
     /// whether torque and motion of a sample rest on measured values; the others have no weight
     pub measured: Vec<bool>,
+    /// whether an actuator stands still, actuator-major; empty where none ever does
+    pub standing: Vec<bool>,
     /// standard deviation of a measured position, by actuator
     pub position_noise: Vec<f64>,
     /// highest frequency with motion in it, Hz
@@ -78,33 +81,60 @@ impl Series {
         self.measured.iter().filter(|m| **m).count()
     }
 
-    /// A signal with zeros where nothing was measured.
-    pub fn silenced<'a>(&self, x: &'a [f64]) -> Cow<'a, [f64]> {
-        if self.measured.iter().all(|m| *m) {
-            return Cow::Borrowed(x);
+    /// Samples that say something about actuator `j`: measured, and not at rest.
+    pub fn counted(&self, j: usize) -> Cow<'_, [bool]> {
+        if self.standing.is_empty() {
+            return Cow::Borrowed(&self.measured);
         }
-        let kept = x.iter().zip(&self.measured);
-        Cow::Owned(kept.map(|(x, m)| if *m { *x } else { 0.0 }).collect())
+        let stands = &self.standing[j * self.count..(j + 1) * self.count];
+        let pairs = self.measured.iter().zip(stands);
+        Cow::Owned(pairs.map(|(m, s)| *m && !s).collect())
     }
 
-    /// Mean period of a signal, over measured samples; 0 where no period has one.
+    /// Standard deviation of the velocity of actuator `j`, from the noise of its position and the band of the motion.
+    pub fn velocity_noise(&self, j: usize) -> f64 {
+        let density = 2.0 * self.position_noise[j].powi(2) * self.dt / self.periods() as f64;
+        cutoff::velocity_noise(density, self.band.min(0.5 / self.dt))
+    }
+
+    /// Number of them.
+    pub fn counts(&self, j: usize) -> usize {
+        self.counted(j).iter().filter(|c| **c).count()
+    }
+
+    /// Whether any actuator moves at any time.
+    pub fn moves(&self) -> bool {
+        self.standing.is_empty() || self.standing.contains(&false)
+    }
+
+    /// A signal of actuator `j` with zeros where nothing was measured or the actuator stood.
+    pub fn silenced<'a>(&self, j: usize, x: &'a [f64]) -> Cow<'a, [f64]> {
+        let counted = self.counted(j);
+        if counted.iter().all(|c| *c) {
+            return Cow::Borrowed(x);
+        }
+        let kept = x.iter().zip(counted.iter());
+        Cow::Owned(kept.map(|(x, c)| if *c { *x } else { 0.0 }).collect())
+    }
+
+    /// Mean period of a signal of actuator `j`, over samples that count; 0 where no period has one.
     ///
     /// # Panics
     /// If the record does not repeat.
-    pub fn period_mean(&self, x: &[f64]) -> Vec<f64> {
+    pub fn period_mean(&self, j: usize, x: &[f64]) -> Vec<f64> {
         let cycle = self.cycle.expect("a record that repeats");
-        means(x, &self.measured, cycle)
+        means(x, &self.counted(j), cycle)
             .into_iter()
             .map(Option::unwrap_or_default)
             .collect()
     }
 
-    /// Freedoms that are left of the measured samples beside their mean period.
+    /// Freedoms that are left of the samples of actuator `j` that count, beside their mean period.
     ///
     /// # Panics
     /// If the record does not repeat.
-    pub fn freedoms(&self) -> usize {
-        freedoms(&self.measured, self.cycle.expect("a record that repeats"))
+    pub fn freedoms(&self, j: usize) -> usize {
+        freedoms(&self.counted(j), self.cycle.expect("a record that repeats"))
     }
 
     /// Brings a log onto its grid. `likely` are periods of other records, tried where it states none.
@@ -152,7 +182,7 @@ impl Series {
             }
             _ => {
                 let mut step = mean;
-                while 1.0 / step > 600.0 {
+                while 1.0 / step > RATE {
                     step *= 2.0;
                 }
                 (step, (span / step).floor() as usize + 1, None)
@@ -212,6 +242,12 @@ impl Series {
             None => 4 * half_width(dt) + 2,
         };
         widen(&mut measured, cycle, reach);
+        if cycle.is_none() && count > 4 * reach {
+            // a low-pass does not know what was before and after: a record that is cut out of a motion has no
+            // accelerations at its ends
+            measured[..reach].fill(false);
+            measured[count - reach..].fill(false);
+        }
         if 2 * measured.iter().filter(|m| **m).count() < LEAST {
             return Err(Error::Infeasible(format!(
                 "{}: too few samples are sound in all channels for a diagnosis; see the warnings of \
@@ -237,6 +273,13 @@ impl Series {
             let exact = vec![0.0; n];
             differentiated(&columns, &exact, count, cycles, dt).0
         });
+        let standing = standing(
+            plant,
+            &motion,
+            &position_noise,
+            cycle.map_or(1, |c| count / c),
+            dt,
+        );
         let x = plant.coordinate_motion(&motion, cycle)?;
         let actuators = motion;
         Ok(Series {
@@ -250,11 +293,33 @@ impl Series {
             reference,
             tau,
             measured,
+            standing,
             position_noise,
             band,
             payload: log.payload,
             order: 0,
             remarks,
         })
+    }
+}
+
+/// Where each actuator stands still, actuator-major; empty where none ever does. `periods` are averaged.
+fn standing(plant: &Plant, motion: &Samples, noise: &[f64], periods: usize, dt: f64) -> Vec<bool> {
+    let band = if periods > 1 { BAND } else { SMOOTH };
+    let mut all = Vec::with_capacity(motion.q.len());
+    for (j, actuator) in plant.actuators().into_iter().enumerate() {
+        let row = j * motion.count..(j + 1) * motion.count;
+        let density = 2.0 * noise[j].powi(2) * dt / periods as f64;
+        let joint = standstill::Joint {
+            position_noise: noise[j],
+            velocity_noise: cutoff::velocity_noise(density, band.min(0.5 / dt)),
+            motion: actuator.motion,
+        };
+        let slow = standstill::slow(joint, &motion.q[row.clone()], &motion.qd[row]);
+        all.extend(standstill::lasting(&slow, dt));
+    }
+    match all.contains(&true) {
+        true => all,
+        false => Vec::new(),
     }
 }

@@ -13,6 +13,9 @@ use std::f64::consts::PI;
 /// Highest frequency of the Fourier series of a repeating motion, Hz.
 pub const BAND: f64 = 30.0;
 
+/// About where the low-pass of a motion that does not repeat cuts off, Hz.
+pub const SMOOTH: f64 = 12.0;
+
 /// Fourier series of the mean period, with its derivatives, over the whole record. `steps` are
 /// the variances of the encoders' steps by actuator.
 fn periodic(
@@ -144,7 +147,7 @@ fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> (Samples, Vec<f64>
         out.qd[j * count..(j + 1) * count].copy_from_slice(&velocity);
         out.qdd[j * count..(j + 1) * count].copy_from_slice(&acceleration);
     }
-    (out, noise, 12.0)
+    (out, noise, SMOOTH)
 }
 
 fn difference(x: &[f64], dt: f64) -> Vec<f64> {

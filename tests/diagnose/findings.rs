@@ -180,7 +180,8 @@ fn stribeck_friction_of_another_formula() {
         claims(&d)
     );
     let f = &d.findings[0];
-    assert!(f.holdout > 0.7, "shrinks {}", f.holdout);
+    let holdout = f.holdout.unwrap_or(0.0);
+    assert!(holdout > 0.7, "shrinks {holdout}");
     assert!(f.decoys.is_some_and(|d| d < 0.1), "{:?}", f.decoys);
     // an interval about the share, and a simulated robot that follows the log more closely
     assert!(f.interval[0] <= f.explains && f.explains <= f.interval[1]);
@@ -360,7 +361,9 @@ fn what_was_not_measured_has_no_weight_without_periods() {
             a.joint, a.rms, b.rms, a.noise, b.noise
         );
         // a tenth of the rows is out, so the two differ by what these rows would have said
-        assert!((b.rms / a.rms - 1.0).abs() < 0.1, "{} {}", a.rms, b.rms);
+        // nothing may be left above the noise at all
+        let apart = (b.rms - a.rms).abs();
+        assert!(apart < 0.1 * a.rms.max(a.noise), "{} {}", a.rms, b.rms);
         assert!(
             (b.noise / a.noise - 1.0).abs() < 0.1,
             "{} {}",
@@ -393,7 +396,7 @@ fn loaded(with: [bool; 4], payload: Payload) -> Vec<Record> {
 fn a_known_load_is_no_gap() {
     let known = Payload::Known {
         mass: 0.8,
-        com: [0.1, 0.02, 0.0],
+        com: Some([0.1, 0.02, 0.0]),
         inertia: None,
     };
     let [bare, stated] =
@@ -402,13 +405,23 @@ fn a_known_load_is_no_gap() {
     let rms = |d: &Diagnosis| d.frozen.iter().map(|g| g.rms).collect::<Vec<_>>();
     println!("{:?} {:?} {:?}", rms(&empty), rms(&stated), rms(&bare));
     assert_eq!(stated.verdict, Verdict::NoGap, "{:?}", claims(&stated));
-    for ((s, e), b) in rms(&stated).iter().zip(rms(&empty)).zip(rms(&bare)) {
+    for (s, e) in rms(&stated).iter().zip(rms(&empty)) {
         assert!((s / e - 1.0).abs() < 0.15, "{s} {e}");
-        assert!(
-            b > 1.5 * e,
-            "the load shows where nothing states it: {b} {e}"
-        );
     }
+    // where nothing states it, it is found to be in these records, and not in the robot
+    carries(&bare, 0.8);
+    assert!(empty.findings.iter().all(|f| f.records.is_empty()));
+}
+
+/// The first finding is a load of this mass in some of the records.
+fn carries(d: &Diagnosis, mass: f64) {
+    let first = d.findings.first().expect("a finding");
+    assert!(first.effect == "payload" && first.is_claim(), "{first:?}");
+    assert!(!first.records.is_empty(), "{first:?}");
+    let value = first.values.iter().find(|v| v.name == "mass");
+    let value = value.map_or(0.0, |v| v.value);
+    assert!((value / mass - 1.0).abs() < 0.1, "{value} kg");
+    assert_ne!(d.verdict, Verdict::NoGap);
 }
 
 /// Records with an unknown load and records of the empty robot are one robot: the load is free, and what
@@ -439,15 +452,8 @@ fn an_unknown_load_is_estimated_beside_the_effects() {
         .parse()
         .expect("a number");
     assert!((mass / 0.8 - 1.0).abs() < 0.1, "{remark}");
-    // the same load, taken for part of the robot on the records that carry it, is a gap
-    let mixed = diagnosed(&loaded(with, Payload::None));
-    let energy = |d: &Diagnosis| -> f64 { d.frozen.iter().map(|g| g.rms.powi(2)).sum() };
-    assert!(
-        energy(&mixed) > 1.5 * energy(&sound),
-        "{} {}",
-        energy(&mixed),
-        energy(&sound)
-    );
+    // the same load, which nothing states, is named
+    carries(&diagnosed(&loaded(with, Payload::None)), 0.8);
 }
 
 /// A load that only holdout records carry cannot be predicted.

@@ -7,4 +7,5 @@ mod controller;
 mod findings;
 mod next;
 mod parallel;
+mod real;
 mod thresholds;

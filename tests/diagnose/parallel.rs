@@ -69,7 +69,7 @@ impl Rehearsal {
             first.map_or("-", |f| f.effect),
             first.map_or(0.0, |f| f.confidence),
             first.map_or(0.0, |f| f.explains),
-            first.map_or(0.0, |f| f.holdout),
+            first.and_then(|f| f.holdout).unwrap_or(0.0),
         );
         d
     }

@@ -215,6 +215,9 @@ fn no_bare_fraction_is_left_in_the_stages_about_the_verdict() {
         "data",
         "payload",
         "improve",
+        "carried",
+        "at_rest",
+        "result",
     ];
     let formulas: [f64; 4] = [0.618_033_988_749_895, 3.0, 10.0, 12.0];
     for stage in stages {

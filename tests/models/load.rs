@@ -408,7 +408,7 @@ fn a_known_load_tells_the_drive_gains() {
     };
     let payload = Payload::Known {
         mass: known[0],
-        com: [known[1], known[2], known[3]],
+        com: Some([known[1], known[2], known[3]]),
         inertia: Some(std::array::from_fn(|k| known[4 + k])),
     };
     let records = vec![

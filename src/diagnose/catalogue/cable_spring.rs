@@ -1,6 +1,7 @@
 //! A cable or hose pulls on one joint: a static torque over its position.
 
 use super::*;
+use crate::report::format::significant;
 
 /// Cable or hose spring.
 pub struct CableSpring;
@@ -65,6 +66,27 @@ impl Effect for CableSpring {
         // a spring: the pull changes over the range, it is no mere offset
         let varies = eta[1..].iter().fold(0.0f64, |m, v| m.max(v.abs()));
         varies > 0.15 * eta[0].abs() || shape.form == CUBIC
+    }
+
+    fn impossible(
+        &self,
+        cx: &Context,
+        place: &Place,
+        shape: &Shape,
+        eta: &[f64],
+    ) -> Option<String> {
+        let j = place.first();
+        let [a, b] = cx.data.range[j];
+        // from one end of the range to the other
+        let odd = if shape.form == LINEAR { 0.0 } else { eta[3] };
+        let stiffness = 2.0 * (eta[1] + odd) / (b - a).max(1e-9);
+        (stiffness < 0.0).then(|| {
+            format!(
+                "its stiffness over the range would be negative ({} {}): a cable pulls back",
+                significant(stiffness, 3),
+                cx.unit(j, Quantity::Stiffness)
+            )
+        })
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {

@@ -16,6 +16,11 @@ impl Effect for Cogging {
             separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
         }
     }
+    fn most(&self) -> f64 {
+        // a motor that cogs by half of what it can would not turn smoothly at all
+        0.5
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
         cx.singles()
     }
@@ -75,7 +80,7 @@ pub(crate) fn orders(cx: &Context, j: usize) -> Vec<Shape> {
     }
     // residual of the model against position, line by line
     let fitted = cx.data.fitted;
-    let weights = &cx.data.measured()[..fitted];
+    let weights = &cx.data.counted(j)[..fitted];
     let residual: Vec<f64> = (0..fitted)
         .map(|i| weights[i] * (cx.data.tau[j][i] - cx.model[j][i]))
         .collect();

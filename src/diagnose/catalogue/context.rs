@@ -118,6 +118,12 @@ impl<'a> Context<'a> {
         quantity.unit(self.motion(j))
     }
 
+    /// The largest torque that an actuator can make, where the robot file states one.
+    pub fn effort(&self, j: usize) -> Option<f64> {
+        let effort = self.data.plant.actuators()[j].limits.effort;
+        (effort.is_finite() && effort > 0.0).then_some(effort)
+    }
+
     /// Unit of the torque of an actuator.
     pub fn torque_unit(&self, j: usize) -> &'static str {
         self.unit(j, Quantity::Torque)

@@ -20,6 +20,11 @@ impl Effect for Counterbalance {
         true
     }
 
+    fn most(&self) -> f64 {
+        // it holds what the drive cannot
+        3.0
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
         if !cx.serial() {
             return Vec::new();

@@ -133,7 +133,7 @@ pub(crate) fn body_columns(cx: &Context, body: usize, count: usize) -> Vec<Colum
             let kind = plant::Column::Inertial { body, k };
             let c = cx.data.parameters.iter().position(|p| p.kind == kind)?;
             let rows = (0..cx.data.joints())
-                .map(|j| (j, cx.data.w[j].col(c).iter().copied().collect()))
+                .filter_map(|j| Some((j, cx.data.w[j].get(c)?.to_vec())))
                 .collect();
             let live = prune(Column { rows });
             Some(match live.rows.is_empty() {

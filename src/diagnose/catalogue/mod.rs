@@ -116,6 +116,21 @@ pub trait Effect: Sync {
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, _eta: &[f64]) -> bool {
         true
     }
+    /// Why no machine has these coefficients, where none has: not tried as long as another shape is left, and
+    /// never found.
+    fn impossible(
+        &self,
+        _cx: &Context,
+        _place: &Place,
+        _shape: &Shape,
+        _eta: &[f64],
+    ) -> Option<String> {
+        None
+    }
+    /// The largest torque that it can make on its joint, over what its drive can.
+    fn most(&self) -> f64 {
+        1.0
+    }
     /// Coefficients and shape as physical parameters.
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value>;
     /// Adds it to the bodies and joints of `robot`, those of the nominal model or others like them: which

@@ -1,10 +1,13 @@
 //! Payload: mass on the last link or the platform that the model does not have, `Y_n (m, m c)`.
 
 use super::*;
+use crate::report::format::significant;
 
 /// Payload.
 pub struct Payload;
 
+/// Heaviest load of a robot, over the mass of its moving parts: small parallel robots carry more than they weigh.
+const HEAVIEST: f64 = 3.0;
 /// A point mass.
 const POINT: u8 = 0;
 /// With an inertia of its own.
@@ -80,6 +83,24 @@ impl Effect for Payload {
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         let reach = (eta[1].powi(2) + eta[2].powi(2) + eta[3].powi(2)).sqrt();
         eta[0] > 0.0 && reach < 0.8 * eta[0]
+    }
+
+    fn impossible(
+        &self,
+        cx: &Context,
+        _place: &Place,
+        _shape: &Shape,
+        eta: &[f64],
+    ) -> Option<String> {
+        let bodies = cx.data.plant.robot().bodies.iter();
+        let own: f64 = bodies.map(|b| b.inertia.mass()).sum();
+        (own > 0.0 && eta[0] > HEAVIEST * own).then(|| {
+            format!(
+                "it would be a load of {} kg on a robot whose moving parts have {} kg",
+                significant(eta[0], 3),
+                significant(own, 3)
+            )
+        })
     }
 
     fn values(&self, _cx: &Context, e: &Estimate) -> Vec<Value> {

@@ -83,6 +83,7 @@ fn record(plant: &Plant, x: &Samples, tau: Vec<f64>) -> Series {
         reference: None,
         tau,
         measured: vec![true; x.count],
+        standing: Vec::new(),
         position_noise: vec![0.0; n],
         band: 20.0,
         payload: crate::log::Payload::None,

@@ -22,6 +22,18 @@ impl Evidence<'_> {
             .collect()
     }
 
+    /// Standard deviation of parameter `i` beside all others, from records and prior, for noise of variance 1.
+    pub fn std(&self, i: usize) -> f64 {
+        let mut x = Mat::<f64>::zeros(self.d.len(), 1);
+        x[(i, 0)] = self.spread[i];
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+            self.l.as_ref(),
+            x.as_mut(),
+            faer::Par::Seq,
+        );
+        x.col(0).norm_l2()
+    }
+
     fn reduced(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
         let mut u = self.d.clone();
         let mut at = 0;

@@ -25,11 +25,10 @@ impl<'a> Evidence<'a> {
             .map(|j| {
                 let mut out = Mat::zeros(data.rows(), p);
                 for c in 0..p {
-                    let from: Vec<f64> = data.w[j].col(c).iter().copied().collect();
-                    if from.iter().all(|v| *v == 0.0) {
+                    let Some(from) = data.w[j].get(c) else {
                         continue;
-                    }
-                    for (i, v) in data.modelled(j, &from).into_iter().enumerate() {
+                    };
+                    for (i, v) in data.modelled(j, from).into_iter().enumerate() {
                         out[(i, c)] = v;
                     }
                 }

@@ -174,6 +174,7 @@ impl Trial<'_> {
             reference: None,
             tau: vec![0.0; n * count],
             measured: vec![true; count],
+            standing: Vec::new(),
             position_noise: vec![0.0; n],
             band: T.next.band,
             payload: Payload::None,

@@ -23,7 +23,7 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
             html! { @if f.joints.is_empty() { "whole robot" } @else { (f.joints.join(", ")) } },
             html! { (percent(f.confidence)) },
             html! { (percent(f.explains)) @if f.member { div { small { (percent(f.interval[0])) "–" (percent(f.interval[1])) } } } },
-            html! { (percent(f.holdout)) },
+            html! { (held(f)) },
             html! { (percent(f.visibility)) @if f.frozen { div { small { "against the prior" } } } },
             html! {
                 @if let Some(d) = f.decoys { (percent(d)) } @else { "–" }
@@ -57,6 +57,11 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
                 &rest.iter().map(|f| row(f)).collect::<Vec<_>>())))
         }
     }
+}
+
+/// The share on holdout records, where there are any.
+fn held(f: &Finding) -> String {
+    f.holdout.map_or("–".into(), percent)
 }
 
 fn values(f: &Finding) -> Markup {
@@ -98,12 +103,12 @@ pub(super) fn shrink(d: &Diagnosis) -> Markup {
         .iter()
         .filter(|f| f.member)
         .map(|f| {
-            total += f.holdout;
+            total += f.holdout.unwrap_or(0.0);
             vec![
                 html! { (f.title) },
                 html! { (percent(f.explains)) },
-                html! { (percent(f.holdout)) },
-                html! { (percent(total.clamp(0.0, 1.0))) },
+                html! { (held(f)) },
+                html! { @if d.holdout.is_some() { (percent(total.clamp(0.0, 1.0))) } @else { "–" } },
             ]
         })
         .collect();

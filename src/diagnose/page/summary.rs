@@ -10,7 +10,7 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
         .max_by(|a, b| d.refit[*a].share.total_cmp(&d.refit[*b].share))
         .unwrap_or(0);
     let g = &d.refit[worst];
-    let shrink = 1.0 - d.holdout[1] / d.holdout[0].max(1e-9);
+    let shrink = d.holdout.map(|[a, b]| 1.0 - b / a.max(1e-9));
     let share = |s: Option<f64>| s.map_or("–".to_string(), percent);
     let all = [
         (
@@ -25,9 +25,14 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
             ),
         ),
         (
-            percent(shrink.max(0.0)),
+            shrink.map_or("–".into(), |s| percent(s.max(0.0))),
             "of the gap gone on holdout records".into(),
-            "with the effects found, parameters from the fitted records".into(),
+            match shrink {
+                Some(_) => "with the effects found, parameters from the fitted records".into(),
+                None => {
+                    "there is no holdout record in which anything moves: this cannot be said".into()
+                }
+            },
         ),
         (
             format!(
@@ -46,7 +51,12 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
         (
             d.bound.map_or("–".into(), percent),
             "any function of the state could explain".into(),
-            "bins of position and velocity of each joint, tried on other periods".into(),
+            match d.records.iter().any(|r| r.fit && r.repeats) {
+                true => {
+                    "bins of position and velocity of each joint, tried on other periods".into()
+                }
+                false => "no record repeats: this cannot be said".into(),
+            },
         ),
     ];
     tiles(&all)
@@ -64,6 +74,12 @@ pub(super) fn limits(d: &Diagnosis) -> Markup {
                     html! { @if p.is_empty() { "whole robot" } @else { (p) } },
                     html! { (percent(*v)) },
                 ]).collect::<Vec<_>>())))
+        }
+        @if !d.ruled_out.is_empty() {
+            p { "These would explain a part of the gap, with values that no machine can have. They are no explanation:" }
+            ul { @for r in &d.ruled_out {
+                li { (r.title) @if !r.joints.is_empty() { " on " (r.joints.join(" and ")) } ": " (r.why) "." }
+            } }
         }
         @if !d.warnings.is_empty() {
             h3 { "Warnings" }

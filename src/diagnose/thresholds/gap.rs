@@ -21,6 +21,9 @@ pub struct Gap {
     /// Least part of the gap on an effect's joints that stays after `slack` is taken off. Unit: share.
     /// Source: by hand.
     pub slack_share: f64,
+    /// What a refit may leave of a joint in a verdict of no gap, with what does not repeat. Unit: noise variances.
+    /// Source: `gap.sound` and the slack of `measure.broad`, rounded up.
+    pub left: f64,
     /// Share of the gap that may stay in a gap that counts as explained. Unit: share. Source: by hand.
     pub unexplained: f64,
     /// Lags that the autocorrelation of a residual is summed over. Unit: samples. Source: by hand.
@@ -33,6 +36,7 @@ pub(super) const GAP: Gap = Gap {
     floor_share: 0.3,
     slack: 0.05,
     slack_share: 0.3,
+    left: 1.0,
     unexplained: 0.15,
     lags: 20,
 };

@@ -1,5 +1,7 @@
 //! What is taken from the records and the robot file before any effect: noise, window, reversals, prior.
 
+use super::gate::{Gate, gate};
+
 /// Noise of the measured torque.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Noise {
@@ -29,6 +31,9 @@ pub struct Noise {
     pub last: usize,
     /// Least power of a line over that of all. Unit: share. Source: by hand.
     pub least: f64,
+    /// Least deviation of the noise over the root mean square of the torques. Unit: share. Source: by hand: torques of
+    /// machines are not known better, and a simulator's log has no noise at all.
+    pub of_torque: f64,
     /// Frequency above which what encoders leave unknown of the acceleration grows no more. Unit: Hz. Source: by
     /// hand.
     pub resolved: f64,
@@ -48,8 +53,46 @@ pub(super) const NOISE: Noise = Noise {
     above: 2.0,
     last: 8,
     least: 1e-3,
+    of_torque: 2e-3,
     resolved: 60.0,
     excess: 5,
+};
+
+/// Robots that stand.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Rest {
+    /// Time at which no joint moves that is worth a sentence. Unit: s. Source: by hand.
+    pub least: f64,
+    /// Deviation of a torque at rest over its noise from which on something pushes. Unit: ratio. Source: by hand.
+    pub pushed: f64,
+}
+
+pub(super) const REST: Rest = Rest {
+    least: 0.5,
+    pushed: 3.0,
+};
+
+/// A load that some records carry and others do not.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Carried {
+    /// Records up to which they are compared. Unit: count. Source: by hand, for the time it takes.
+    pub records: usize,
+    /// Farthest that its centre of mass may be from the frame of the body that carries it. Unit: m. Source: by hand.
+    pub reach: f64,
+    /// What a load of its own for either half of a record gains, over what one load gains. Unit: share. Source: by hand.
+    pub unsteady: Gate,
+    /// Share of the energy above the noise of its records that it takes away. Unit: share. Source: by hand.
+    pub share: Gate,
+    /// Part of its gain that a load in all records does not bring. Unit: share. Source: by hand.
+    pub beyond: Gate,
+}
+
+pub(super) const CARRIED: Carried = Carried {
+    records: 8,
+    reach: 0.8,
+    unsteady: gate(0.25, 0.03),
+    share: gate(0.4, 0.05),
+    beyond: gate(0.15, 0.03),
 };
 
 /// What the torque channel makes of a signal.
@@ -61,6 +104,9 @@ pub struct Window {
     pub saturated: f64,
     /// Largest variance of the window. Unit: samples². Source: by hand.
     pub widest: f64,
+    /// Variance, of a torque that is averaged over plus and minus one sample, that one taken at an instant lacks. Unit:
+    /// samples². Source: the variance of a triangle of that width.
+    pub instant: f64,
     /// Most of it that one pass of a kernel of three points takes. Unit: samples². Source: by hand.
     pub pass: f64,
 }
@@ -69,6 +115,7 @@ pub(super) const WINDOW: Window = Window {
     fine: 4,
     saturated: 20.0,
     widest: 3.0,
+    instant: 1.0 / 6.0,
     pass: 0.3,
 };
 
@@ -86,6 +133,9 @@ pub struct Reversals {
     pub bent: f64,
     /// How long that lasts to either side, and how long it takes to fade. Unit: s. Source: by hand.
     pub near: f64,
+    /// Deviations of its velocity within which a joint may move either way; twice as many where that fades. Unit: count.
+    /// Source: by hand.
+    pub blind: f64,
     /// Part of its fastest speed below which a drive of a closed chain may stand. Unit: share. Source: by hand.
     pub stands: f64,
     /// Time by which velocities from positions are blurred. Unit: s. Source: by hand.
@@ -98,6 +148,7 @@ pub(super) const REVERSALS: Reversals = Reversals {
     rounding: 0.5,
     bent: 0.1,
     near: 0.012,
+    blind: 1.0,
     stands: 0.01,
     blur: 0.015,
 };

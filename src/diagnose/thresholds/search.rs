@@ -23,6 +23,11 @@ pub struct Search {
     pub pair_margin: f64,
     /// What a challenger must gain to replace a member, over what that one gains. Unit: ratio. Source: by hand.
     pub exchange_margin: f64,
+    /// Gain over that of the best effect, from which on one that no machine can have is worth a word. Unit: share. Source:
+    /// by hand.
+    pub worth_a_word: f64,
+    /// How many of those. Unit: count. Source: by hand.
+    pub words: usize,
     /// Rounds of exchange. Unit: count. Source: by hand.
     pub rounds: usize,
 }
@@ -38,6 +43,8 @@ pub(super) const SEARCH: Search = Search {
     pairs: 22,
     pair_margin: 0.01,
     exchange_margin: 1.01,
+    worth_a_word: 0.1,
+    words: 8,
     rounds: 2,
 };
 

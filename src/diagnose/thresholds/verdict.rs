@@ -107,6 +107,8 @@ pub struct Confidence {
     pub repeats: Gate,
     /// Confidence above which the nearest effect is named where nothing is claimed. Unit: 0 to 1. Source: by hand.
     pub nearest: f64,
+    /// Confidence below which a claim is called probable, and the report is not green. Unit: 0 to 1. Source: by hand.
+    pub sure: f64,
 }
 
 pub(super) const CONFIDENCE: Confidence = Confidence {
@@ -127,6 +129,7 @@ pub(super) const CONFIDENCE: Confidence = Confidence {
     holdout: gate(0.3, 0.07),
     repeats: gate(0.45, 0.07),
     nearest: 0.15,
+    sure: 0.9,
 };
 
 /// Effects that show in the parameters of the nominal model alone.
@@ -149,6 +152,12 @@ pub struct Hidden {
     pub of_gain: f64,
     /// The same in multiples of `entry.gain`. Unit: ratio. Source: by hand.
     pub of_entry: f64,
+    /// Share of the residual's gap that an effect explains, below which one that takes most of what is unlikely of the
+    /// parameters is judged by these. Unit: share. Source: by hand.
+    pub of_residual: f64,
+    /// Energy that a hidden effect may leave on holdout records over what the model as it is leaves there, where it does
+    /// not predict them better than a refit. Unit: share. Source: by hand.
+    pub follows: f64,
     /// Columns up to which a hidden effect can be compared between records. Unit: count. Source: by hand.
     pub columns: usize,
 }
@@ -160,6 +169,8 @@ pub(super) const HIDDEN: Hidden = Hidden {
     faint: 0.5,
     of_gain: 0.5,
     of_entry: 1.5,
+    of_residual: 0.15,
+    follows: 0.35,
     columns: 4,
 };
 

@@ -77,9 +77,14 @@ impl<'a> Beside<'a> {
         // parameters stand out
         let faint = out.in_rows() * out.matters < T.hidden.faint;
         let little = (T.hidden.of_gain * out.gain).max(T.hidden.of_entry * T.entry.gain * rows);
+        // nor is a residual that hardly falls, where most of what is unlikely of the parameters goes
+        let free = st.evidence.data.parameters.len() as f64;
+        let unlikely = (surprise_without - free).max(1.0);
+        let lives_there = out.explains() < T.hidden.of_residual
+            && out.fall > T.confidence.parameters.centre * unlikely;
         out.frozen = st.may_hide(set, i)
             && out.fall > T.hidden.surprise
-            && (faint || out.gain_in_rows() < little);
+            && (faint || out.gain_in_rows() < little || lives_there);
         out
     }
 

@@ -143,13 +143,24 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     if significant && generalises {
         let after = st.gap(&r1, true);
         let worth = st.matters(&set[i], &gap, &after);
-        return worth > T.entry.claimable
-            && (st.remembers(&set[i]) || predicted > T.entry.claimable);
+        let enters =
+            worth > T.entry.claimable && (st.remembers(&set[i]) || predicted > T.entry.claimable);
+        // one that lives in the parameters is judged by them, if the residual hardly shows it
+        let faint = worth <= T.entry.claimable && prior > T.hidden.surprise;
+        if enters || !faint {
+            return enters;
+        }
     }
+    // what lives in the parameters takes the place of a refit: it must predict where the model as it is does not
+    let held_rows = || data.fitted..data.rows();
+    let follows = || {
+        let frozen = energy(&st.evidence.r, held_rows());
+        energy(&r1, held_rows()) < T.hidden.follows * frozen
+    };
     st.may_hide(set, i)
         && prior > T.hidden.surprise
         && (generalises || prior > T.entry.prior_share * visible.abs())
-        && (held == 0 || hold > -T.entry.holdout_rise * held as f64)
+        && (held == 0 || hold > -T.entry.holdout_rise * held as f64 || follows())
 }
 
 /// The two candidates that explain most together.

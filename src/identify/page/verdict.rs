@@ -1,6 +1,7 @@
 //! What the identification says, in words and in key figures.
 
 use crate::identify::Identification;
+use crate::identify::doubts::predicts_worse;
 use crate::plant::Plant;
 use crate::report::format::{NBSP, percent, significant};
 use crate::report::html::{self, Tone};
@@ -26,7 +27,10 @@ pub fn verdict(plant: &Plant, id: &Identification) -> (Tone, String) {
             );
             let nominal = v.nominal.1.unwrap_or(f64::INFINITY);
             text += &format!(" (nominal model: {}).", percent(nominal));
-            if h.relative_error > 2.0 * fit.max(0.01) {
+            if predicts_worse(id).is_some() {
+                text += " It predicts worse than the nominal model: keep that one, or record motion that excites more.";
+                Tone::Bad
+            } else if h.relative_error > 2.0 * fit.max(0.01) {
                 text += " It does not carry over well: the fit records excite other motion, or the robot \
                          does something that the model lacks; look at the joints with the largest holdout error.";
                 Tone::Bad
