@@ -2,9 +2,11 @@
 //! its turn, dead play that gravity closes. Each is linear in one number, so that `q + Σ η_k z_k(q)` takes the
 //! place of the reading `q`.
 
+use super::serial::Link;
 use super::unknown::{Part, Unknown};
 use crate::dynamics::{Samples, Tree, Workspace};
-use crate::robot::{Motion, Robot};
+use crate::robot::{Inertia, Motion, Robot};
+use nalgebra::{Matrix3, Vector3};
 
 /// How `z` depends on the posture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,6 +107,18 @@ impl Gravity {
         let row = |s: usize| self.joints.iter().map(|&j| -tau[j * count + s]).collect();
         (0..count).map(row).collect()
     }
+}
+
+/// The same robot with even rods of 1 kg/m between its joints, for a file that states no masses.
+pub fn rods(robot: &Robot, links: &[Link], tip: &Vector3<f64>) -> Robot {
+    let mut robot = robot.clone();
+    for (i, link) in links.iter().enumerate() {
+        let end = links.get(i + 1).map_or(*tip, |next| next.body.position);
+        if let Some(body) = robot.bodies.iter_mut().find(|b| b.name == link.body.name) {
+            body.inertia = Inertia::from_com(end.norm(), end * 0.5, Matrix3::zeros());
+        }
+    }
+    robot
 }
 
 /// Columns of one kind of effect for all joints that can have it. `torques` are those of the postures at hand.

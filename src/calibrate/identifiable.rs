@@ -56,10 +56,14 @@ pub struct Identifiability {
 impl Identifiability {
     /// Gauge freedoms in words.
     pub fn gauge(&self) -> Vec<String> {
+        let apart = |name: &str| match name.rsplit_once('.') {
+            Some((of, what)) => format!("{of} {what}"),
+            None => name.to_string(),
+        };
         let words = |c: &Confounded| {
-            let name = c.parameter.replace('.', " ");
+            let name = apart(&c.parameter);
             match c.with.first() {
-                Some((other, _)) => format!("{name} against {}", other.replace('.', " ")),
+                Some((other, _)) => format!("{name} against {}", apart(other)),
                 None => format!("{name} alone"),
             }
         };

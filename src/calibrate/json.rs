@@ -113,7 +113,10 @@ pub fn json(found: &Calibrated) -> Value {
         "outliers": found.outliers.iter().map(|o| o.row).collect::<Vec<_>>(),
         "outlier_rows": outliers,
         "distances": distances,
-        "effects": found.trials,
+        "effects": found.trials.iter().map(|t| json!({
+            "effect": t.effect, "without": number(t.without), "with": number(t.with),
+            "significance": number(t.significance), "evidence": number(t.evidence), "kept": t.kept,
+        })).collect::<Vec<_>>(),
         "gravity": found.gravity,
         "noise_factor": number(found.noise),
         "tool_std": stats(Stats::of(&tool)),

@@ -7,11 +7,13 @@ use super::rows::Value;
 use super::start::median;
 use nalgebra::Vector3;
 
-/// Mean, root mean square, 95th percentile and maximum of errors.
+/// Mean, median, root mean square, 95th percentile and maximum of errors.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Stats {
     /// mean
     pub mean: f64,
+    /// half of the errors are no larger
+    pub median: f64,
     /// root mean square
     pub rms: f64,
     /// 95 % of the errors are no larger
@@ -29,6 +31,7 @@ impl Stats {
         let max = *e.last()?;
         Some(Stats {
             mean: e.iter().sum::<f64>() / n as f64,
+            median: e[n / 2],
             rms: (e.iter().map(|x| x * x).sum::<f64>() / n as f64).sqrt(),
             p95: e[((0.95 * n as f64).ceil() as usize).clamp(1, n) - 1],
             max,
@@ -56,8 +59,6 @@ pub struct Errors {
     pub angle: Vec<Option<f64>>,
     /// the same distance with the middle of the socket, which strays do not move, m
     pub robust: Vec<f64>,
-    /// where the frame's origin is, base axes; for sockets relative to the middle, m
-    pub offset: Vec<Vector3<f64>>,
 }
 
 /// Errors at `x`.
@@ -68,7 +69,6 @@ pub fn errors(model: &Model, x: &[f64]) -> Errors {
         distance: vec![f64::NAN; n],
         angle: vec![None; n],
         robust: vec![f64::NAN; n],
-        offset: vec![Vector3::zeros(); n],
     };
     let posed: Vec<_> = (0..n)
         .map(|i| model.posed(i, x).ok().map(|p| p.frame))
@@ -87,7 +87,6 @@ pub fn errors(model: &Model, x: &[f64]) -> Errors {
                 for (i, p) in at {
                     out.distance[i] = (p - mean).norm();
                     out.robust[i] = (p - centre).norm();
-                    out.offset[i] = p - centre;
                 }
             }
             Kind::Plane | Kind::Gauge => {
@@ -109,7 +108,6 @@ pub fn errors(model: &Model, x: &[f64]) -> Errors {
                         Value::Position(p) => (*p, None),
                         _ => continue,
                     };
-                    out.offset[i] = seen.p - p;
                     out.distance[i] = (seen.p - p).norm();
                     out.robust[i] = out.distance[i];
                     out.angle[i] = r.map(|r| log(&(seen.r * r.transpose())).norm());

@@ -47,6 +47,7 @@ use faer::Mat;
 use fit::Plan;
 use judge::Group;
 use model::Model;
+use nalgebra::DMatrix;
 use std::path::Path;
 
 /// One identified unknown.
@@ -159,8 +160,8 @@ pub struct RowResult {
     pub after: f64,
     /// the same in orientation, rad
     pub angles: Option<[f64; 2]>,
-    /// residual after calibration, m
-    pub residual: [f64; 3],
+    /// joint readings, rad or m
+    pub q: Vec<f64>,
     /// position of the frame in the base, m
     pub position: [f64; 3],
     /// standard deviation of the tool's position that the unknowns leave, m
@@ -254,7 +255,21 @@ fn gravity(
             return Ok(Some(found));
         }
     }
-    Ok(None)
+    let model::Kin::Arm(arm) = &opened.kin else {
+        return Ok(None);
+    };
+    warnings.push(Warning::new(
+        WarningKind::NominalModelAssumed,
+        opened.plant.name(),
+        "its file states no inertia; torques of gravity are those of even rods of 1 kg/m between its joints. What is \
+         said of joint compliance holds in kind, its values do not. Name a robot with masses by gravity = \"robot.toml\"",
+    ));
+    let rods = effects::rods(opened.plant.robot(), &arm.links, &arm.tip.p);
+    Ok(Gravity::of(
+        rods,
+        &opened.joints,
+        "even rods of 1 kg/m".into(),
+    ))
 }
 
 /// Calibrates.
@@ -318,6 +333,7 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     let x_before = set_up(&nominal, &plan, &x0)?;
     let before = judge::errors(&nominal, &x_before);
     suspicious(input, &before, &mut warnings);
+    unmoved(input, &opened.joints, &mut warnings);
     let names = &opened.joints;
     let motions = opened.kin.motions(names.len());
     let columns = |part: Part| {
@@ -530,8 +546,11 @@ fn set_up(model: &Model, plan: &Plan, x: &[f64]) -> Result<Vec<f64>> {
         free,
         ..plan.clone()
     };
-    let x = fit::solve(model, &only, x)?.x;
-    set_up_rest(model, plan, &x)
+    // without it nothing holds the tilt of a camera before a robot that keeps its own
+    let mut model = model.clone();
+    model.settings.orientation = true;
+    let x = fit::solve(&model, &only, x)?.x;
+    set_up_rest(&model, plan, &x)
 }
 
 /// What only held-out rows see: their sockets and planes.
@@ -637,6 +656,27 @@ fn suspicious(input: &Calibration, before: &Errors, warnings: &mut Vec<Warning>)
     }
 }
 
+/// Joints that hardly move from one fitted row to the next.
+fn unmoved(input: &Calibration, joints: &[String], warnings: &mut Vec<Warning>) {
+    /// rad or m
+    const LITTLE: f64 = 0.02;
+    for (k, name) in joints.iter().enumerate() {
+        let all = || input.rows.iter().filter(|r| r.fit).map(|r| r.q[k]);
+        let range = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
+        if range < LITTLE {
+            warnings.push(Warning::new(
+                WarningKind::JointNotMoving,
+                name.clone(),
+                format!(
+                    "it moves by {} between the fitted rows: its errors cannot be told from those of its neighbours. \
+                     Record postures that differ",
+                    crate::error::number(range)
+                ),
+            ));
+        }
+    }
+}
+
 fn row_results(
     model: &Model,
     x: &[f64],
@@ -647,12 +687,11 @@ fn row_results(
 ) -> Vec<RowResult> {
     let input = model.input;
     let n = model.of_robot;
+    let posed: Vec<Option<serial::Posed>> = (0..input.rows.len())
+        .map(|i| model.posed(i, x).ok())
+        .collect();
+    let predicted = tool_stds(&posed, covariance, n);
     let each = |(i, r): (usize, &rows::Row)| {
-        let posed = model.posed(i, x).ok();
-        let predicted = match (&posed, covariance) {
-            (Some(p), Some(c)) => tool_std(&p.jacobian, c, n),
-            _ => f64::NAN,
-        };
         let angles = before.angle[i].zip(after.angle[i]);
         RowResult {
             group: input.group_of(r).min(groups.len().saturating_sub(1)),
@@ -661,25 +700,53 @@ fn row_results(
             before: before.distance[i],
             after: after.distance[i],
             angles: angles.map(|(a, b)| [a, b]),
-            residual: after.offset[i].into(),
-            position: posed.map_or([f64::NAN; 3], |p| p.frame.p.into()),
-            predicted,
+            q: r.q.clone(),
+            position: posed[i]
+                .as_ref()
+                .map_or([f64::NAN; 3], |p| p.frame.p.into()),
+            predicted: predicted[i],
         }
     };
     input.rows.iter().enumerate().map(each).collect()
 }
 
-/// `√tr(J Σ Jᵀ)` of the position, m.
-fn tool_std(j: &nalgebra::DMatrix<f64>, c: &Mat<f64>, n: usize) -> f64 {
-    let mut sum = 0.0;
-    for i in 0..3 {
-        for a in 0..n {
-            for b in 0..n {
-                sum += j[(i, a)] * c[(a, b)] * j[(i, b)];
-            }
-        }
+/// Standard deviation of the tool's position in every row, m: `√tr(L Σ Lᵀ)`, with the rigid motions of all rows
+/// together taken out of `L`.
+fn tool_stds(posed: &[Option<serial::Posed>], covariance: Option<&Mat<f64>>, n: usize) -> Vec<f64> {
+    let Some(c) = covariance else {
+        return vec![f64::NAN; posed.len()];
+    };
+    let known: Vec<(usize, &serial::Posed)> = posed
+        .iter()
+        .enumerate()
+        .filter_map(|(i, p)| Some((i, p.as_ref()?)))
+        .collect();
+    let mut l = DMatrix::zeros(3 * known.len(), n);
+    let mut rigid = DMatrix::zeros(3 * known.len(), 6);
+    for (k, (_, p)) in known.iter().enumerate() {
+        l.view_mut((3 * k, 0), (3, n))
+            .copy_from(&p.jacobian.rows(0, 3));
+        rigid
+            .view_mut((3 * k, 0), (3, 3))
+            .copy_from(&nalgebra::Matrix3::identity());
+        rigid
+            .view_mut((3 * k, 3), (3, 3))
+            .copy_from(&(-frame::skew(&p.frame.p)));
     }
-    sum.max(0.0).sqrt()
+    if known.len() > 2 {
+        let q = rigid.qr().q();
+        l -= &q * q.tr_mul(&l);
+    }
+    let c = DMatrix::from_fn(n, n, |a, b| c[(a, b)]);
+    let lc = &l * c;
+    let mut out = vec![f64::NAN; posed.len()];
+    for (k, (i, _)) in known.iter().enumerate() {
+        let square: f64 = (0..3)
+            .map(|d| lc.row(3 * k + d).dot(&l.row(3 * k + d)))
+            .sum();
+        out[*i] = square.max(0.0).sqrt();
+    }
+    out
 }
 
 fn group_results(groups: &[Group], rows: &[RowResult]) -> Vec<GroupResult> {

@@ -82,6 +82,7 @@ fn row(name: Markup, g: Option<Stats>) -> Vec<Markup> {
     vec![
         name,
         cell(&|s| s.mean),
+        cell(&|s| s.median),
         cell(&|s| s.rms),
         cell(&|s| s.p95),
         cell(&|s| s.max),
@@ -128,7 +129,7 @@ fn accuracy(found: &Calibrated) -> Section {
     Section::new(
         "Accuracy",
         html! {
-            (html::table(&["mm", "mean", "RMS", "95th percentile", "maximum"], &[], &rows))
+            (html::table(&["mm", "mean", "median", "RMS", "95th percentile", "maximum"], &[], &rows))
             @if found.groups.len() > 1 {
                 h3 { "By group" }
                 (html::table(
@@ -200,20 +201,14 @@ fn residuals(found: &Calibrated) -> Section {
             panel("after", &|r| r.after, rules),
         ],
     };
-    let names = ["x", "y", "z"];
-    let along = (0..3).map(|k| {
+    let along = found.joints.iter().enumerate().map(|(k, name)| {
         let of = |fit: bool| -> Vec<[f64; 2]> {
-            found
-                .rows
-                .iter()
-                .filter(|r| r.fit == fit && !r.outlier)
-                .map(|r| [r.position[2], 1e3 * r.residual[k]])
-                .collect()
+            let own = found.rows.iter().filter(|r| r.fit == fit && !r.outlier);
+            own.map(|r| [r.q[k], 1e3 * r.after]).collect()
         };
         Panel {
-            title: format!("residual in {}", names[k]),
-            x: Axis::linear("height of the frame in the base, m"),
-            y: Axis::linear("mm"),
+            x: Axis::linear(format!("{name}, rad or m")),
+            y: Axis::linear("error, mm"),
             series: vec![
                 dots(of(true), Colour::BLUE),
                 dots(of(false), Colour::ORANGE),
@@ -222,10 +217,10 @@ fn residuals(found: &Calibrated) -> Section {
         }
     });
     let spread = Figure {
-        description: "residuals in three directions over height".into(),
+        description: "errors over the readings of each joint".into(),
         width: Figure::WIDTH,
-        height: 170.0,
-        columns: 3,
+        height: 120.0,
+        columns: 4,
         column_titles: Vec::new(),
         row_titles: Vec::new(),
         share_x: false,
@@ -245,7 +240,7 @@ fn residuals(found: &Calibrated) -> Section {
         html! {
             (html::figure(errors.svg(), html! { (legend) }))
             (html::figure(spread.svg(), html! {
-                "Sound rows after calibration. What bends with the height is not geometry: joints or links give way."
+                "Sound rows after calibration. Errors that follow the reading of a joint are not of the geometry."
             }))
         },
     )
@@ -326,6 +321,7 @@ fn effects(found: &Calibrated) -> Section {
                 html! { (significant(1e3 * t.with, 4)) },
                 html! { (percent(1.0 - t.with / t.without)) },
                 html! { (significant(t.significance, 3)) },
+                html! { (significant(t.evidence, 3)) },
                 html! { (if t.kept { "kept" } else { "left out" }) },
             ]
         })
@@ -335,8 +331,8 @@ fn effects(found: &Calibrated) -> Section {
         html! {
             p { "Each was judged by fitted rows that were left out in turn; the rows held out took no part." }
             (html::table(
-                &["effect", "error without, mm", "with, mm", "less by", "standard errors", ""],
-                &[5],
+                &["effect", "error without, mm", "with, mm", "less by", "standard errors", "ln evidence", ""],
+                &[6],
                 &rows,
             ))
             @if let Some(g) = &found.gravity {
@@ -443,9 +439,9 @@ fn tool(found: &Calibrated) -> Section {
         "Uncertainty of the tool",
         html! {
             (html::figure(figure.svg(), html! {
-                "Standard deviation of the tool's position in the base frame that the unknowns leave, in the recorded \
-                 postures: mean " (mm(mean(s))) ", largest " (mm(s.map_or(f64::NAN, |s| s.max))) ". It holds as far \
-                 as the model does, and counts the place of the base frame itself, which sockets do not tell."
+                "Standard deviation of the tool's position that the unknowns leave, in the recorded postures: mean "
+                (mm(mean(s))) ", largest " (mm(s.map_or(f64::NAN, |s| s.max))) ". It holds as far as the model does. \
+                 Rigid motions of all postures together are taken out: nothing tells where the base stands."
             }))
         },
     )

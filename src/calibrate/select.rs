@@ -23,6 +23,8 @@ pub struct Trial {
     pub with: f64,
     /// mean of the improvement by its standard error
     pub significance: f64,
+    /// natural logarithm of how many times more likely all fitted rows are with it
+    pub evidence: f64,
     /// whether it is part of the calibrated model
     pub kept: bool,
 }
@@ -38,8 +40,10 @@ pub struct Chosen {
 
 /// An effect must lower the error of rows left out by this fraction.
 const WORTH: f64 = 0.02;
-/// And by this many standard errors.
+/// And by this many standard errors, …
 const SURE: f64 = 3.0;
+/// … or the fitted rows must be that much more likely with it (natural logarithm): few groups leave few to compare.
+const EVIDENCE: f64 = 10.0;
 /// Parts of the rows where there are no groups to leave out.
 const FOLDS: usize = 5;
 
@@ -74,46 +78,174 @@ pub fn choose<'a>(
         return Ok(Chosen::default());
     }
     let folds = folds(input);
-    let mut chosen = Chosen::default();
-    let base = left_out(make(chosen.features.clone()), &folds)?;
-    let Some(mut base) = base else {
-        return Ok(chosen);
+    let search = Search {
+        make,
+        columns: &columns,
+        folds: &folds,
     };
-    let mut open: Vec<&'static str> = super::EFFECTS.to_vec();
-    while !open.is_empty() {
-        let mut best: Option<(Trial, Vec<f64>)> = None;
-        let mut tried = Vec::new();
-        for &effect in &open {
-            let mut more = chosen.features.clone();
-            let own = columns(effect);
-            if own.is_empty() {
-                continue;
-            }
-            more.extend(own);
-            let Some(errors) = left_out(make(more), &folds)? else {
-                continue;
-            };
-            let trial = compare(effect, &base, &errors);
-            tried.push(trial.clone());
-            if best.as_ref().is_none_or(|b| trial.with < b.0.with) {
-                best = Some((trial, errors));
-            }
+    let mut kept: Vec<&'static str> = Vec::new();
+    let mut trials = Vec::new();
+    let Some(mut base) = search.errors(&kept)? else {
+        return Ok(Chosen::default());
+    };
+    for effect in super::EFFECTS {
+        if columns(effect).is_empty() {
+            continue;
         }
-        let Some((mut trial, errors)) = best else {
-            break;
+        let more: Vec<&'static str> = kept.iter().copied().chain([effect]).collect();
+        let Some(errors) = search.errors(&more)? else {
+            continue;
         };
-        let better = trial.with < (1.0 - WORTH) * trial.without && trial.significance > SURE;
-        if !better {
-            chosen.trials.extend(tried);
-            break;
+        let mut trial = search.compare(effect, [&kept, &more], &base, &errors)?;
+        let rival = effect == "backlash" && kept.contains(&"joint_compliance");
+        trial.kept = trial.better() && !rival;
+        if trial.kept {
+            kept = more;
+            base = errors;
+        } else if rival {
+            // what gives way and what has play both follow the load: the better of the two
+            let other: Vec<&'static str> = kept
+                .iter()
+                .map(|e| if *e == "joint_compliance" { effect } else { e })
+                .collect();
+            if let Some(errors) = search.errors(&other)? {
+                let swap = search.compare(effect, [&kept, &other], &base, &errors)?;
+                if swap.better() {
+                    trial = Trial { kept: true, ..swap };
+                    trials.iter_mut().for_each(|t: &mut Trial| {
+                        t.kept &= t.effect != "joint_compliance";
+                    });
+                    kept = other;
+                    base = errors;
+                }
+            }
         }
-        trial.kept = true;
-        open.retain(|e| *e != trial.effect);
-        chosen.features.extend(columns(trial.effect));
-        chosen.trials.push(trial);
-        base = errors;
+        trials.push(trial);
     }
-    Ok(chosen)
+    Ok(Chosen {
+        features: kept.iter().flat_map(|e| columns(e)).collect(),
+        trials,
+    })
+}
+
+/// Tries sets of effects.
+struct Search<'s, 'a> {
+    make: &'s dyn Fn(Vec<Feature>) -> Model<'a>,
+    columns: &'s dyn Fn(&str) -> Vec<Feature>,
+    folds: &'s [Option<usize>],
+}
+
+impl Search<'_, '_> {
+    /// Errors of all fitted rows, each predicted by the others; `None` where a part cannot be left out. Noise and
+    /// strays are those of a fit to all of them, from which the fits to parts start.
+    fn errors(&self, effects: &[&'static str]) -> Result<Option<Outcome>> {
+        let features: Vec<Feature> = effects.iter().flat_map(|e| (self.columns)(e)).collect();
+        let mut model = (self.make)(features);
+        let of = |keep: &dyn Fn(usize) -> bool| -> Vec<f64> {
+            let weight = |(i, f): (usize, &Option<usize>)| match f {
+                Some(f) if keep(*f) && model.nominal[i].is_some() => 1.0,
+                _ => 0.0,
+            };
+            self.folds.iter().enumerate().map(weight).collect()
+        };
+        let mut whole = Plan {
+            weights: of(&|_| true),
+            free: Vec::new(),
+            robust: true,
+        };
+        whole.free = super::seen(&model, &whole);
+        let parts: Vec<Vec<f64>> = (0..self.folds.iter().flatten().max().map_or(0, |m| m + 1))
+            .map(|fold| of(&|f| f != fold))
+            .collect();
+        let x = vec![0.0; model.count()];
+        let start = super::robustly(&mut model, &mut whole, &x)?;
+        let mut out = vec![f64::NAN; self.folds.len()];
+        for (fold, weights) in parts.iter().enumerate() {
+            let weights: Vec<f64> = weights
+                .iter()
+                .zip(&whole.weights)
+                .map(|(a, b)| a * b)
+                .collect();
+            if weights.iter().sum::<f64>() < 6.0 {
+                return Ok(None);
+            }
+            let mut plan = Plan {
+                weights,
+                free: Vec::new(),
+                robust: true,
+            };
+            plan.free = super::seen(&model, &plan);
+            let fit = super::fit::solve(&model, &plan, &start.x)?;
+            let x = super::set_up_rest(&model, &plan, &fit.x)?;
+            let errors = judge::errors(&model, &x);
+            for (i, f) in self.folds.iter().enumerate() {
+                if *f == Some(fold) {
+                    out[i] = errors.robust[i];
+                }
+            }
+        }
+        Ok(Some(Outcome {
+            errors: out,
+            noise: model.noise,
+            weights: whole.weights,
+        }))
+    }
+
+    /// Logarithm of the evidence (Laplace), up to a constant, with noise and strays of an outcome:
+    /// `−½ (misfit + prior) − ½ ln det(P Λ)`.
+    fn evidence(&self, effects: &[&'static str], of: &Outcome) -> Result<f64> {
+        let features: Vec<Feature> = effects.iter().flat_map(|e| (self.columns)(e)).collect();
+        let mut model = (self.make)(features);
+        model.noise = of.noise;
+        let mut plan = Plan {
+            weights: of.weights.clone(),
+            free: Vec::new(),
+            robust: true,
+        };
+        plan.free = super::seen(&model, &plan);
+        let fit = super::fit::solve(&model, &plan, &vec![0.0; model.count()])?;
+        let Some(at) = super::fit::normal(&model, &plan, &fit.x, true) else {
+            return Ok(f64::NAN);
+        };
+        let n = model.count();
+        let matrix = nalgebra::DMatrix::from_fn(n, n, |i, k| at.matrix[(i, k)]);
+        let Some(factor) = matrix.cholesky() else {
+            return Ok(f64::NAN);
+        };
+        let half_ln_det: f64 = factor.l().diagonal().iter().map(|d| d.ln()).sum();
+        Ok(-0.5 * at.cost - half_ln_det)
+    }
+
+    /// A trial: sets of effects without and with it, and what came out.
+    fn compare(
+        &self,
+        effect: &'static str,
+        [without, with]: [&[&'static str]; 2],
+        base: &Outcome,
+        new: &Outcome,
+    ) -> Result<Trial> {
+        let mut trial = compare(effect, &base.errors, &new.errors);
+        trial.evidence = self.evidence(with, base)? - self.evidence(without, base)?;
+        Ok(trial)
+    }
+}
+
+/// What a set of effects gives.
+struct Outcome {
+    /// errors of the rows that were left out, m
+    errors: Vec<f64>,
+    /// factor on the noise
+    noise: f64,
+    /// 0 for strays
+    weights: Vec<f64>,
+}
+
+impl Trial {
+    /// Rows left out are predicted better, and that is no accident.
+    fn better(&self) -> bool {
+        let sure = self.significance > SURE || self.evidence > EVIDENCE;
+        self.with < (1.0 - WORTH) * self.without && sure
+    }
 }
 
 /// Which part each row belongs to; `None` for rows that are held out.
@@ -134,38 +266,6 @@ fn folds(input: &Calibration) -> Vec<Option<usize>> {
     input.rows.iter().enumerate().map(each).collect()
 }
 
-/// Errors of all fitted rows, each predicted by the others; `None` where a part cannot be left out.
-fn left_out(fresh: Model, folds: &[Option<usize>]) -> Result<Option<Vec<f64>>> {
-    let count = folds.iter().flatten().max().map_or(0, |m| m + 1);
-    let mut out = vec![f64::NAN; folds.len()];
-    for fold in 0..count {
-        let weights: Vec<f64> = folds
-            .iter()
-            .map(|f| f64::from(u8::from(f.is_some_and(|f| f != fold))))
-            .collect();
-        if weights.iter().sum::<f64>() < 6.0 {
-            return Ok(None);
-        }
-        let mut model = fresh.clone();
-        let mut plan = Plan {
-            weights,
-            free: Vec::new(),
-            robust: true,
-        };
-        plan.free = super::seen(&model, &plan);
-        let x = vec![0.0; model.count()];
-        let fit = super::robustly(&mut model, &mut plan, &x)?;
-        let x = super::set_up_rest(&model, &plan, &fit.x)?;
-        let errors = judge::errors(&model, &x);
-        for (i, f) in folds.iter().enumerate() {
-            if *f == Some(fold) {
-                out[i] = errors.robust[i];
-            }
-        }
-    }
-    Ok(Some(out))
-}
-
 /// Pairwise; rows that are far off either way do not decide.
 fn compare(effect: &'static str, without: &[f64], with: &[f64]) -> Trial {
     let typical = judge::middle(without);
@@ -184,6 +284,7 @@ fn compare(effect: &'static str, without: &[f64], with: &[f64]) -> Trial {
         without: mean(&|p| p.0),
         with: mean(&|p| p.1),
         significance: gain / (spread / n.sqrt()).max(f64::MIN_POSITIVE),
+        evidence: 0.0,
         kept: false,
     }
 }

@@ -556,3 +556,89 @@ fn chosen_postures_know_more_than_random_ones() {
         assert_eq!(found.csv(), again.csv());
     }
 }
+
+/// A Panda with a ball in sockets, as recorded; skipped where the recording is not at hand.
+#[test]
+fn a_real_panda_and_its_spoiled_placement() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let named = std::env::var_os("EXCITE_SHARED").map(std::path::PathBuf::from);
+    let places = ["../shared", "../../shared"].map(|p| root.join(p));
+    let found = named
+        .into_iter()
+        .chain(places)
+        .map(|p| p.join("data/mukca"))
+        .find(|p| p.is_dir());
+    let Some(data) = found else {
+        eprintln!("skipped: ../shared/data/mukca is not there");
+        return;
+    };
+    let data = data.canonicalize().unwrap();
+    let data = data.display();
+    let mut text = format!("robot = \"{data}/panda.urdf\"\nframe = \"ball_link\"\n");
+    let fit = ["front_center", "back_left", "mid_left"];
+    let rest = [
+        "back_right",
+        "front_left",
+        "front_right",
+        "high",
+        "mid-high",
+        "mid_right",
+    ];
+    for place in fit.iter().chain(&rest) {
+        let purpose = if fit.contains(place) {
+            "fit"
+        } else {
+            "holdout"
+        };
+        for hole in 0..2 {
+            text += &format!(
+                "[[measurement]]\nkind = \"point\"\nfile = \"{data}/panda_2/{place}/hole_{hole}.csv\"\n\
+                 group = \"{place}\"\nuse = \"{purpose}\"\nstd = 0.0002\n"
+            );
+        }
+        if fit.contains(place) {
+            text += &format!(
+                "[[distance]]\nbetween = [\"{data}/panda_2/{place}/hole_0.csv\", \
+                 \"{data}/panda_2/{place}/hole_1.csv\"]\nvalue = 0.05\n"
+            );
+        }
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("calibration.toml");
+    std::fs::write(&file, text).unwrap();
+    let (input, opened) = read(&file).unwrap();
+    let found = calibrate(&input, &opened, Settings::default()).unwrap();
+    let mean = |wanted: bool| {
+        let own: Vec<f64> = found
+            .groups
+            .iter()
+            .filter(|g| g.fit == wanted && !g.spoiled)
+            .map(|g| g.after.unwrap().mean)
+            .collect();
+        own.iter().sum::<f64>() / own.len() as f64
+    };
+    assert!(mean(true) <= 0.20e-3, "{}", mean(true));
+    assert!(mean(false) <= 0.29e-3, "{}", mean(false));
+    let spoiled: Vec<&str> = found
+        .groups
+        .iter()
+        .filter(|g| g.spoiled)
+        .map(|g| g.name.as_str())
+        .collect();
+    assert_eq!(spoiled, ["high"]);
+    let compliance = found
+        .trials
+        .iter()
+        .find(|t| t.effect == "joint_compliance")
+        .unwrap();
+    assert!(compliance.kept && compliance.with < compliance.without);
+    for (file, line) in [("back_left/hole_1.csv", 31), ("front_left/hole_1.csv", 23)] {
+        assert!(
+            found
+                .outliers
+                .iter()
+                .any(|o| o.file.ends_with(file) && o.line == line),
+            "{file}:{line}"
+        );
+    }
+}

@@ -15,7 +15,7 @@ use std::path::PathBuf;
                   readings, in an order with a short way), report.json and report.html, which compares them with \
                   random ones.",
     after_help = "Examples:\n  excite poses ur5e --count 40\n  excite poses h4 --count 45 --std 0.0003 --angle-std \
-                  0.00035\n  excite poses panda --kind point --point 0.5,0,0.1 --point 0.4,0.3,0.1"
+                  0.00035 --rehearse 1\n  excite poses panda --kind point --point 0.5,0,0.1 --point 0.4,0.3,0.1"
 )]
 pub struct Args {
     /// Robot: a robot.toml, a URDF, or the name of a bundled one
@@ -70,6 +70,10 @@ pub struct Args {
     /// Seed of all draws
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Write also measured.csv and calibration.toml: what a camera or tracker would see of a robot whose geometry is off
+    /// by these tolerances, with the noise, and 200 rows held out without it
+    #[arg(long, value_name = "SEED")]
+    rehearse: Option<u64>,
     #[command(flatten)]
     collisions: Collisions,
 }
@@ -147,15 +151,36 @@ pub fn run(args: Args) -> Result<()> {
         candidates: args.candidates,
         seed: args.seed,
     };
-    let names = ["poses.csv", "report.json", "report.html"];
-    let folder = Folder::new(&args.output, &names, args.force)?;
+    if args.rehearse.is_some() && kind == Kind::Point {
+        return Err(Error::Argument(
+            "--rehearse is of poses and positions, not of points".into(),
+        ));
+    }
+    let all = [
+        "poses.csv",
+        "report.json",
+        "report.html",
+        "measured.csv",
+        "calibration.toml",
+    ];
+    let names = &all[..if args.rehearse.is_some() { 5 } else { 3 }];
+    let folder = Folder::new(&args.output, names, args.force)?;
     let found = poses::choose(&opened, &request)?;
     warn(&found.warnings);
-    let files = [
+    let mut files = vec![
         folder.write(names[0], &found.csv())?,
         folder.write(names[1], &pretty(&found.json()))?,
         folder.write(names[2], &poses::page::html(&found))?,
     ];
+    if let Some(seed) = args.rehearse {
+        let robot = match std::fs::canonicalize(&args.robot) {
+            Ok(path) => path.to_string_lossy().into_owned(),
+            Err(_) => args.robot.clone(),
+        };
+        let text = poses::toml(&robot, args.frame.as_deref(), &request, all[3]);
+        files.push(folder.write(all[3], &poses::rehearse(&opened, &request, &found, seed)?)?);
+        files.push(folder.write(all[4], &text)?);
+    }
     let mut out = format!(
         "{}: {} postures leave the tool uncertain by {:.4} mm, as many random ones by {:.4} mm\n",
         found.robot,

@@ -12,6 +12,7 @@ use crate::error::{Error, Result, Warning, WarningKind};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// One posture.
@@ -40,11 +41,13 @@ pub struct Search<'a> {
 }
 
 /// Draws for each posture that is wanted before the search is given up.
-const DRAWS: usize = 60;
+const DRAWS: usize = 20;
+/// Draws at a time.
+const BATCH: usize = 256;
 /// Part of a range that is left free at both ends.
 const MARGIN: f64 = 0.03;
 /// Steps to a point, and how near counts as reached, m.
-const STEPS: usize = 30;
+const STEPS: usize = 20;
 const REACHED: f64 = 1e-9;
 
 impl<'a> Search<'a> {
@@ -131,28 +134,36 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Candidates, and the number of draws.
-    ///
-    /// # Errors
-    /// None so far; the type is that of its callers.
-    pub fn draw(&mut self, rng: &mut ChaCha8Rng, wanted: usize) -> Result<(Vec<Candidate>, usize)> {
+    /// Candidates, and the number of draws. Draws come in batches that are looked at on all threads, so that the answer
+    /// does not depend on their number.
+    pub fn draw(&self, rng: &mut ChaCha8Rng, wanted: usize) -> (Vec<Candidate>, usize) {
+        let points = self.request.points.len().max(1);
         let mut found = Vec::new();
         let mut draws = 0;
         while found.len() < wanted && draws < DRAWS * wanted {
-            draws += 1;
-            let at: Vec<f64> = self
-                .ranges
-                .iter()
-                .map(|[a, b]| rng.random_range(*a..=*b))
+            let batch: Vec<(usize, Vec<f64>)> = (0..BATCH)
+                .map(|k| {
+                    let at = self
+                        .ranges
+                        .iter()
+                        .map(|[a, b]| rng.random_range(*a..=*b))
+                        .collect();
+                    ((draws + k) % points, at)
+                })
                 .collect();
-            let point = found.len() % self.request.points.len().max(1);
-            found.extend(self.posture(at, point));
-            // a search without any room ends early
-            if draws >= 4000 && found.is_empty() {
+            draws += BATCH;
+            let new: Vec<Candidate> = batch
+                .into_par_iter()
+                .filter_map(|(point, at)| self.posture(at, point))
+                .collect();
+            found.extend(new);
+            // a search with hardly any room ends early
+            if draws >= 20 * BATCH && found.len() * 100 < draws {
                 break;
             }
         }
-        Ok((found, draws))
+        found.truncate(wanted);
+        (found, draws)
     }
 
     /// A posture a little away from another one.

@@ -16,6 +16,9 @@ mod candidates;
 mod criterion;
 mod order;
 pub mod page;
+mod rehearse;
+
+pub use rehearse::{rehearse, toml};
 
 use super::file::{Calibration, Kind, Measurement, Tolerances};
 use super::frame::Frame;
@@ -80,6 +83,8 @@ pub struct Poses {
     pub warnings: Vec<Warning>,
 }
 
+/// Most candidates that reach a point: each takes a search of its own.
+const REACHING: usize = 1000;
 /// Draws of random postures to compare with.
 const DRAWS: usize = 20;
 /// Postures over which the tool's uncertainty is averaged.
@@ -97,9 +102,12 @@ pub fn choose(opened: &Opened, request: &Request) -> Result<Poses> {
         )));
     }
     let mut rng = ChaCha8Rng::seed_from_u64(request.seed);
-    let mut search = Search::new(opened, request)?;
-    let wanted = request.candidates.max(2 * request.count);
-    let (found, draws) = search.draw(&mut rng, wanted)?;
+    let search = Search::new(opened, request)?;
+    let wanted = match request.kind {
+        Kind::Point => request.candidates.min(REACHING),
+        _ => request.candidates,
+    };
+    let (found, draws) = search.draw(&mut rng, wanted.max(2 * request.count));
     if found.len() < request.count {
         return Err(Error::Infeasible(format!(
             "{}: of {draws} random postures {} are inside the limits, free of collision and where they are wanted; {} \
@@ -136,13 +144,7 @@ pub fn choose(opened: &Opened, request: &Request) -> Result<Poses> {
         })
         .collect();
     let mut postures: Vec<Candidate> = chosen.rows.iter().map(|&i| found[i].clone()).collect();
-    let predicted = refine(
-        &mut search,
-        &mut problem,
-        &mut chosen,
-        &mut postures,
-        &mut rng,
-    );
+    let predicted = refine(&search, &mut problem, &mut chosen, &mut postures, &mut rng);
     let drawn = order::way(&postures);
     order::shorten(&mut postures, search.rest());
     Ok(Poses {
@@ -167,7 +169,7 @@ const STEP: f64 = 0.06;
 
 /// Small random steps of single postures; those that make the tool better known stay.
 fn refine(
-    search: &mut Search,
+    search: &Search,
     problem: &mut Problem,
     chosen: &mut Chosen,
     postures: &mut [Candidate],
