@@ -42,8 +42,9 @@ pub struct Chosen {
 const WORTH: f64 = 0.02;
 /// And by this many standard errors, …
 const SURE: f64 = 3.0;
-/// … or the fitted rows must be that much more likely with it (natural logarithm): few groups leave few to compare.
-const EVIDENCE: f64 = 10.0;
+/// … or the fitted rows must be that much more likely with it (natural logarithm; "very strong" by Kass & Raftery 1995):
+/// few groups leave few to compare.
+const EVIDENCE: f64 = 5.0;
 /// Parts of the rows where there are no groups to leave out.
 const FOLDS: usize = 5;
 
