@@ -295,9 +295,21 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
         .collect();
     let joint = match rest.is_empty() || number.is_some() && format != Format::Csv {
         true => None,
-        false => Some(name.to_string()),
+        false => Some(joint_part(name)),
     };
     plain(what, joint, number, unit_of(name, what, format))
+}
+
+/// Of a path such as `/joint_states/elbow/position` the part that names the joint.
+fn joint_part(name: &str) -> String {
+    let says = |part: &&str| {
+        !part.is_empty()
+            && !words(part)
+                .iter()
+                .all(|w| quantity(w).is_some() || commands(w))
+    };
+    let part = name.rsplit('/').find(says);
+    part.unwrap_or(name).to_string()
 }
 
 /// The unit that stands in a name, in brackets or at its end; of Kortex degrees.

@@ -6,7 +6,7 @@ use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
 use super::search::{Hypothesis, Match, Problem, Signals};
 use super::units::{extent, fits};
-use super::verdict::{LIKELY_SIGN, SHARE, Verdict, better, explained, orientation};
+use super::verdict::{LIKELY_SIGN, SHARE, Verdict, contradicts, explained, orientation};
 use crate::dynamics::Workspace;
 use crate::error::{Warning, WarningKind};
 use crate::plant::Plant;
@@ -22,7 +22,9 @@ const CUTOFF: f64 = 8.0;
 const GAP: f64 = 4.0;
 
 /// Random orders that are tried beside that of the columns.
-const STARTS: usize = 24;
+const STARTS: usize = 120;
+/// Least median share of the columns of torques that the best order explains, for it to be believed.
+const WHOLE: f64 = 0.85;
 
 /// Gives joints to columns, or confirms those that are stated.
 pub(super) fn examine(
@@ -125,6 +127,25 @@ fn look(
             .for_each(|&p| claims[p].confidence = claims[p].confidence.min(0.4));
         return;
     };
+    // an order that explains little is a local optimum or another robot
+    let shares = problem.shares(best);
+    let middle = crate::log::clock::median(shares.iter().copied());
+    if !stated_all && middle < WHOLE {
+        warnings.push(Warning::new(
+            WarningKind::UnitSuspect,
+            plant.name(),
+            format!(
+                "no order of the columns lets the model explain the torques (at best {:.0} % of their middle column): the \
+                 columns were not given to joints",
+                100.0 * middle
+            ),
+        ));
+        for &p in &positions {
+            claims[p].confidence = claims[p].confidence.min(0.4);
+        }
+        followers(claims, &positions);
+        return;
+    }
     let verdict = Verdict::of(&problem, best, &found, &allowed, n);
     let trusted = stated_all && claims.iter().any(|c| c.evidence.contains("its name"));
     let mut ws = Workspace::default();
@@ -327,7 +348,7 @@ fn contradict(
 ) {
     let joints = plant.actuators();
     let n = joints.len();
-    let differs = stated != best && better(problem, best, stated);
+    let differs = stated != best && contradicts(problem, best, stated);
     for j in 0..n {
         let (stated_k, best_k) = (positions[stated.column[j]], positions[best.column[j]]);
         let same = stated_k == best_k && best.sign[j] == stated.sign[j];
@@ -338,6 +359,12 @@ fn contradict(
                     .evidence
                     .push_str("; the model's torques confirm joint and sign");
             }
+            continue;
+        }
+        // a turned sign alone must be as clear as that
+        let mut back = best.clone();
+        back.sign[j] = -best.sign[j];
+        if stated_k == best_k && !contradicts(problem, best, &back) {
             continue;
         }
         let what = match stated_k == best_k {

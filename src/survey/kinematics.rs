@@ -361,6 +361,11 @@ fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -
         let Some(p) = claims[v].of else { continue };
         let second =
             claims[p].of.is_some_and(|root| claims[root].of.is_none()) && used.contains(&p);
+        // a torque that is mostly inertia goes with an acceleration, too, but in no unit of one
+        if second && claims[v].confidence < 0.9 {
+            claims[v].abstain("it goes with an acceleration, but in no unit of one");
+            continue;
+        }
         claims[v].means = if second {
             Means::Acceleration
         } else {

@@ -226,6 +226,14 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
+    /// Share of each column that its best joint explains.
+    pub fn shares(&self, h: &Hypothesis) -> Vec<f64> {
+        let all = self.matches(h, &mut Workspace::default());
+        (0..self.signals.y.len())
+            .map(|c| all.iter().map(|row| row[c].share).fold(0.0, f64::max))
+            .collect()
+    }
+
     /// Number of samples.
     pub fn count(&self) -> usize {
         self.count

@@ -10,6 +10,10 @@ const BLOCKS: usize = 16;
 const SURE: f64 = 3.0;
 /// … and nats.
 const CLEAR: f64 = 6.0;
+/// … for what is stated to be contradicted.
+const CONTRADICTS: f64 = 60.0;
+/// … and what is then left of some column, in what the statement leaves.
+const MATERIAL: f64 = 0.5;
 /// Least share of a torque column that its joint explains.
 pub(super) const SHARE: f64 = 0.5;
 
@@ -96,6 +100,31 @@ impl Verdict {
 
 /// Whether `a` predicts held-out blocks better than `b`, beyond doubt.
 pub(super) fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
+    let [gain, error] = margin(problem, a, b);
+    gain > CLEAR && gain > SURE * error
+}
+
+/// … and so clearly that `b`, which somebody stated, is contradicted.
+pub(super) fn contradicts(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
+    // friction that is not quite that of the model leaves more than noise, which any hypothesis may fit a little better:
+    // a column must be explained far better
+    let mut ws = Workspace::default();
+    let mut left = |h: &Hypothesis| -> Vec<f64> {
+        let all = problem.matches(h, &mut ws);
+        let columns = all.first().map_or(0, Vec::len);
+        (0..columns)
+            .map(|c| 1.0 - all.iter().map(|row| row[c].share).fold(0.0, f64::max))
+            .collect()
+    };
+    let (la, lb) = (left(a), left(b));
+    let [gain, error] = margin(problem, a, b);
+    la.iter().zip(&lb).any(|(a, b)| *a < MATERIAL * b)
+        && gain > CONTRADICTS
+        && gain > 2.0 * SURE * error
+}
+
+/// Nats by which `a` predicts held-out blocks better than `b`, and their standard error.
+fn margin(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> [f64; 2] {
     let mut ws = Workspace::default();
     let gains: Vec<Vec<f64>> = [false, true]
         .into_iter()
@@ -134,7 +163,7 @@ pub(super) fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool 
     let mean = sum / BLOCKS as f64;
     let spread = per.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (BLOCKS - 1) as f64;
     let error = (spread * BLOCKS as f64).sqrt();
-    sum > CLEAR && sum > SURE * error
+    [sum, error]
 }
 
 /// Confidence of a sign that only its being usual speaks for.
