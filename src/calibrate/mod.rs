@@ -14,12 +14,15 @@ mod file;
 mod fit;
 mod frame;
 mod identifiable;
+#[doc(hidden)]
 pub mod json;
 mod judge;
 mod model;
 mod open;
+#[doc(hidden)]
 pub mod page;
 mod parallel;
+#[doc(hidden)]
 pub mod poses;
 mod rows;
 mod select;
@@ -28,6 +31,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 mod unknown;
+#[doc(hidden)]
 pub mod write;
 mod write_parallel;
 

@@ -72,8 +72,7 @@ fn excitation(e: &Excitation, torque_noise: &[f64]) -> String {
         (None, Some(p)) => {
             let _ = writeln!(
                 out,
-                "axes of legs and platform: closest {}, {:.1} mm at {:.2} s (never below {:.1} mm); surroundings not \
-                 looked at",
+                "collisions: axes of legs and platform only\n  closest: {}, {:.1} mm at {:.2} s (never below {:.1} mm)",
                 p.name,
                 1e3 * p.value,
                 p.time,
@@ -92,7 +91,7 @@ fn excitation(e: &Excitation, torque_noise: &[f64]) -> String {
             if let Some(p) = c.certificate.pairs.first() {
                 let _ = writeln!(
                     out,
-                    "collisions: {verdict}; closest: {} and {}, {:.1} mm at {:.2} s (never below {:.1} mm)",
+                    "collisions: {verdict}\n  closest: {} and {}, {:.1} mm at {:.2} s (never below {:.1} mm)",
                     p.between[0],
                     p.between[1],
                     1e3 * p.least,

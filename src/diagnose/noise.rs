@@ -152,9 +152,9 @@ impl Noise {
         self.filter = predictor(&self.torque);
     }
 
-    /// No less than `least`, N m or N: white noise in its place where it is below that.
+    /// White noise of `least`, N m or N, in its place where there is next to none.
     pub fn at_least(&mut self, least: f64) {
-        if self.std >= least || self.torque.is_empty() {
+        if self.std >= T.noise.none * least || self.torque.is_empty() {
             return;
         }
         self.torque

@@ -214,8 +214,12 @@ fn rpy(r: &Matrix3<f64>) -> [f64; 3] {
 }
 
 /// A name for the base that no link has.
+///
+/// That of the root link as it was read: volumes and frames of `robot.toml` name it.
 fn base_name(robot: &Robot) -> String {
-    let mut name = String::from("base");
+    let links = robot.geometry.links.iter();
+    let mut roots = links.filter(|l| l.body.is_none() && l.parent.is_none());
+    let mut name = roots.next().map_or("base".into(), |l| l.name.clone());
     while robot.bodies.iter().any(|b| b.name == name) {
         name.push('_');
     }

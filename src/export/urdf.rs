@@ -32,18 +32,23 @@ impl Format for Urdf {
     fn write(&self, model: &Model) -> Result<String> {
         let comment = xml_comment(&remark::lines(model.remarks, self));
         Ok(format!(
-            "<?xml version=\"1.0\"?>\n{comment}{}",
-            urdf(model.robot)
+            "<?xml version=\"1.0\"?>\n{comment}{}{}</robot>\n",
+            tree(model.robot),
+            // a mechanism has bodies of its own in between
+            match model.plant.mechanism() {
+                None => fixed_links(model.robot),
+                Some(_) => String::new(),
+            }
         ))
     }
 }
 
-/// The robot as URDF.
-fn urdf(robot: &Robot) -> String {
+/// The robot as URDF, without its end.
+fn tree(robot: &Robot) -> String {
     let mut out = String::new();
     let base = base_name(robot);
     let _ = writeln!(out, "<robot name=\"{}\">", escape(&robot.name));
-    let _ = writeln!(out, "  <link name=\"{base}\"/>");
+    let _ = writeln!(out, "  <link name=\"{}\"/>", escape(&base));
     for body in &robot.bodies {
         let _ = writeln!(out, "  <link name=\"{}\">", escape(&body.name));
         let inertia = possible(&body.inertia);
@@ -136,6 +141,36 @@ fn urdf(robot: &Robot) -> String {
         }
         out.push_str("  </joint>\n");
     }
-    out.push_str("</robot>\n");
+    out
+}
+
+/// Links that are fixed to a body or to the base, without inertia, which is in that of the body: volumes and
+/// frames of `robot.toml` name them.
+fn fixed_links(robot: &Robot) -> String {
+    let base = &base_name(robot);
+    let mut out = String::new();
+    let own = |name: &str| name == base || robot.bodies.iter().any(|b| b.name == name);
+    for link in robot.geometry.links.iter().filter(|l| !own(&l.name)) {
+        let parent = link.body.map_or(base.as_str(), |b| &robot.bodies[b].name);
+        let mut joint = format!("{}_fixed", link.name);
+        while robot.bodies.iter().any(|b| b.joint_name == joint) {
+            joint.push('_');
+        }
+        let [roll, pitch, yaw] = rpy(&link.pose.rotation);
+        let p = link.pose.position;
+        let _ = writeln!(
+            out,
+            "  <link name=\"{}\"/>\n  <joint name=\"{}\" type=\"fixed\">\n    \
+             <origin xyz=\"{} {} {}\" rpy=\"{roll} {pitch} {yaw}\"/>\n    \
+             <parent link=\"{}\"/>\n    <child link=\"{}\"/>\n  </joint>",
+            escape(&link.name),
+            escape(&joint),
+            p.x,
+            p.y,
+            p.z,
+            escape(parent),
+            escape(&link.name)
+        );
+    }
     out
 }

@@ -78,6 +78,7 @@ fn quantity(word: &str) -> Option<Quantity> {
         "tau" | "torque" | "torques" | "effort" | "efforts" | "moment" | "trq" | "force"
         | "eff" => Quantity::Torque,
         "current" | "currents" | "curr" | "cur" | "amps" => Quantity::Current,
+        "dtau" | "taudot" => Quantity::Other,
         "ql" | "qlink" => Quantity::Link,
         "qref" | "qdes" | "qcmd" => Quantity::Command,
         _ => return None,

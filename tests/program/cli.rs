@@ -636,14 +636,13 @@ fn a_log_with_other_names_is_named() {
         )
         .file(
             "a.csv",
-            "time,position_1,position_2,torque_1,torque_2\n0,0,0,0,0\n0.01,0,0,0,0\n",
+            "time,alpha,beta,gamma,delta\n0,0,0,0,0\n0.01,0,0,0,0\n",
         );
     let words = [
         "a.csv",
-        "line 1",
-        "time,position_1",
-        "t, q1 to q2, tau1 to tau2",
-        "rename",
+        "positions of joint1, joint2",
+        "[record.columns]",
+        "excite log",
     ];
     for command in ["identify", "diagnose", "load"] {
         t.fails(&format!("{command} e.toml --output o"), 1, &words);

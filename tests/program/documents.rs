@@ -279,9 +279,14 @@ fn the_example_of_an_experiment_is_read() {
         .nth(1)
         .and_then(|t| t.split("```").next())
         .expect("an example");
+    let examples: String = section_
+        .split("```toml\n")
+        .skip(1)
+        .filter_map(|t| t.split("```").next())
+        .collect();
     for key in documented(section_) {
         let name = key.trim_matches(['[', ']']);
-        assert!(example.contains(name), "`{key}` is not in the example");
+        assert!(examples.contains(name), "`{key}` is in no example");
     }
     let plant = excite::Plant::load("planar2").expect("bundled");
     let joints = plant.actuators().len();

@@ -31,9 +31,11 @@ pub struct Noise {
     pub last: usize,
     /// Least power of a line over that of all. Unit: share. Source: by hand.
     pub least: f64,
-    /// Least deviation of the noise over the root mean square of the torques. Unit: share. Source: by hand: torques of
-    /// machines are not known better, and a simulator's log has no noise at all.
+    /// Deviation of the noise over the root mean square of the torques that stands for none. Unit: share. Source: by
+    /// hand: torques of machines are not known better, and a simulator's log has no noise at all.
     pub of_torque: f64,
+    /// Share of that below which a log has next to none. Unit: share. Source: by hand.
+    pub none: f64,
     /// Frequency above which what encoders leave unknown of the acceleration grows no more. Unit: Hz. Source: by
     /// hand.
     pub resolved: f64,
@@ -54,6 +56,7 @@ pub(super) const NOISE: Noise = Noise {
     last: 8,
     least: 1e-3,
     of_torque: 2e-3,
+    none: 0.1,
     resolved: 60.0,
     excess: 5,
 };
