@@ -122,8 +122,15 @@ fn check_json(value: &Value, place: &str, may_be_null: &[&str]) {
         Value::Number(x) => assert!(x.as_f64().is_some_and(f64::is_finite), "{place}"),
         Value::Null => assert!(
             place.starts_with(".clearance")
-                || [".known_to_10_percent", ".torque_uncertainty", ".limits.tool"].contains(&place)
-                || [".torque_rate", ".velocity_by_position"].iter().any(|k| place.ends_with(k))
+                || [
+                    ".known_to_10_percent",
+                    ".torque_uncertainty",
+                    ".limits.tool"
+                ]
+                .contains(&place)
+                || [".torque_rate", ".velocity_by_position"]
+                    .iter()
+                    .any(|k| place.ends_with(k))
                 || may_be_null
                     .iter()
                     .any(|k| place.ends_with(&format!(".{k}"))),
