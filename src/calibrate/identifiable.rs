@@ -180,6 +180,7 @@ fn echelon(null: &mut [Vec<f64>], model: &Model, columns: &[usize]) -> Vec<Confo
         // the unknown of the first part in which this direction is more than a trace
         let mut best: Option<(usize, usize, f64)> = None;
         for o in 0..4 {
+            #[allow(clippy::needless_range_loop)]
             for row in d..null.len() {
                 for (k, &c) in columns.iter().enumerate() {
                     let size = null[row][k].abs();

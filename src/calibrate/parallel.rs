@@ -151,6 +151,7 @@ impl Parallel {
         let w = [0, 1, 2].map(|k| variable(0.0, first + 3 + k));
         let column = |c: usize| [0, 1, 2].map(|k| pose.r[(k, c)]);
         let mut r = [[constant(0.0); 3]; 3];
+        #[allow(clippy::needless_range_loop)]
         for c in 0..3 {
             let v = column(c);
             r[0][c] = w[1] * v[2] - w[2] * v[1] + v[0];

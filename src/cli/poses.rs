@@ -105,7 +105,7 @@ pub fn run(args: Args) -> Result<()> {
         )));
     }
     let finite = args.point.iter().chain(&args.within).all(|v| v.is_finite());
-    if !finite || args.point.len() % 3 != 0 || !matches!(args.within.len(), 0 | 6) {
+    if !finite || !args.point.len().is_multiple_of(3) || !matches!(args.within.len(), 0 | 6) {
         return Err(Error::Argument(
             "--point takes three numbers, --within six, separated by commas".into(),
         ));

@@ -346,6 +346,7 @@ mod tests {
             offset: 0.25,
             position: [-1.8, 1.8],
         };
+        #[allow(clippy::type_complexity)]
         let ways: [(f64, f64, [(f64, f64); 7]); 3] = [
             (
                 -1.2,

@@ -13,6 +13,7 @@ const AHEAD: f64 = 0.6;
 const RIGID: f64 = 0.3;
 
 /// Columns of torques and currents: joint, gain, what is missing in them.
+#[allow(clippy::too_many_arguments)]
 pub(super) fn families(
     smooth: &Smooth,
     claims: &mut [Claim],
@@ -27,6 +28,7 @@ pub(super) fn families(
     let joints = plant.actuators();
     // each column's joint, where it is far ahead of all others
     let mut of: Vec<Option<usize>> = Vec::new();
+    #[allow(clippy::needless_range_loop)]
     for c in 0..torques.len() {
         let j = (0..n).max_by(|a, b| matches[*a][c].share.total_cmp(&matches[*b][c].share));
         let second = (0..n)

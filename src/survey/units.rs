@@ -89,6 +89,7 @@ pub(super) fn examine(
                 claims[far[0]].joint.clone().unwrap_or_default()
             ),
         ));
+        #[allow(clippy::needless_range_loop)]
         for k in 0..claims.len() {
             let angle = columns.contains(&k)
                 || claims[k].of.is_some_and(|p| columns.contains(&p))

@@ -177,6 +177,7 @@ fn refine(
 ) -> f64 {
     let mut step = STEP;
     for _ in 0..ROUNDS {
+        #[allow(clippy::needless_range_loop)]
         for k in 0..postures.len() {
             let Some(near) = search.near(&postures[k], step, rng) else {
                 continue;
