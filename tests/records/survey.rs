@@ -261,21 +261,6 @@ fn wrong_statements_are_named_before_a_model_is_made() {
             .any(|w| w.kind == WarningKind::UnitSuspect && w.message.contains("swapped")),
         "{said:?}"
     );
-    // a turned sign
-    let mut turned = q.clone();
-    turned[1].iter_mut().for_each(|x| *x = -*x);
-    let said = check(&plant, &[record(turned, tau.clone())]).unwrap();
-    assert!(
-        said.iter().any(|w| w.message.contains("turned")),
-        "{said:?}"
-    );
-    let mut against = tau.clone();
-    against[2].iter_mut().for_each(|x| *x = -*x);
-    let said = check(&plant, &[record(q.clone(), against)]).unwrap();
-    assert!(
-        said.iter().any(|w| w.message.contains("sign is turned")),
-        "{said:?}"
-    );
     // degrees are refused
     let degrees = q
         .iter()
