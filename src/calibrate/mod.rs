@@ -5,8 +5,8 @@
 //! minimise over x   Σ ρ(|Σ_r^(−1/2) r(q, y; x)|)  +  |P^(−1/2) x|²
 //! ```
 //!
-//! with the residuals of [`model`], the prior `P` of the manufacturing tolerances, and a loss `ρ` that strays do not
-//! bend ([`fit`]). Which effects of the joints stand beside the geometry is decided by cross-validation of the rows
+//! with the residuals of `model`, the prior `P` of the manufacturing tolerances, and a loss `ρ` that strays do not
+//! bend (`fit`). Which effects of the joints stand beside the geometry is decided by cross-validation of the rows
 //! that are fitted; the rows held out judge the result and nothing else.
 
 mod effects;

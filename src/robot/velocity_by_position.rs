@@ -10,7 +10,7 @@
 //! documentation, *Limits for Franka Research 3*). A motion that respects it never reaches the ends: it
 //! turns at `q_max − o²/(2 d)` at the latest.
 
-/// Limit of velocity by position; the [module](self) has its equations.
+/// Limit of velocity by position; its module has the equations.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct VelocityByPosition {
     /// `d`, rad/s² or m/s²
