@@ -70,7 +70,7 @@ pub fn excess(record: &Series, j: usize, e: &[f64]) -> (f64, f64) {
     let power: f64 = mean.iter().zip(&often).map(part).sum();
     let repeating = periods * power - variance * (sound - free) as f64;
     // slow changes stand out at the lowest lines; what is broad must exceed the noise clearly
-    let slow = match between_periods(record, j, e) {
+    let slow = match between_periods(record, &counted, e) {
         Some(x) => {
             let s = spectrum(&x);
             let low =

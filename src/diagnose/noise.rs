@@ -8,6 +8,7 @@
 //! alike, so that all tests count independent samples (Pintelon & Schoukens 2012, ch. 9).
 
 use super::thresholds::THRESHOLDS as T;
+use crate::signals::repeats::{freedoms, means};
 use crate::signals::series::Series;
 use std::f64::consts::PI;
 
@@ -52,19 +53,19 @@ pub fn spectrum(x: &[f64]) -> Vec<f64> {
 }
 
 /// Residual with the mean over periods taken away, scaled to the variance of one sample, zero where
-/// nothing was measured or actuator `j` stood; `None` where the record does not repeat.
-pub fn between_periods(record: &Series, j: usize, x: &[f64]) -> Option<Vec<f64>> {
+/// samples do not count; `None` where the record does not repeat.
+pub fn between_periods(record: &Series, counted: &[bool], x: &[f64]) -> Option<Vec<f64>> {
     let cycle = record.cycle?;
     let periods = record.periods();
-    let (counted, sound) = (record.counted(j), record.counts(j));
+    let sound = counted.iter().filter(|c| **c).count();
     let scale = match sound == record.count {
         true => (periods as f64 / (periods - 1) as f64).sqrt(),
-        false => (sound as f64 / record.freedoms(j).max(1) as f64).sqrt(),
+        false => (sound as f64 / freedoms(counted, cycle).max(1) as f64).sqrt(),
     };
-    let mean = record.period_mean(j, x);
-    let apart = |(i, v): (usize, &f64)| match counted[i] {
-        true => scale * (v - mean[i % cycle]),
-        false => 0.0,
+    let mean = means(x, counted, cycle);
+    let apart = |(i, v): (usize, &f64)| match (counted[i], mean[i % cycle]) {
+        (true, Some(mean)) => scale * (v - mean),
+        _ => 0.0,
     };
     Some(x.iter().enumerate().map(apart).collect())
 }

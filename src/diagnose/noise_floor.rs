@@ -8,14 +8,17 @@ use super::data::Data;
 use super::noise::{LINES, Noise, Source, between_periods, spectrum};
 use super::thresholds::THRESHOLDS as T;
 use crate::signals::series::Series;
+use std::borrow::Cow;
 
 impl Data<'_> {
     pub(super) fn first_noise(&self, j: usize) -> Noise {
-        // holdout records may hold what the fitted ones do not: only where those do not repeat
-        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
-        let used = || self.records.iter().filter(|r| r.fit || !repeats);
+        let used = || self.telling();
         let parts: Vec<(Vec<f64>, usize)> = used()
-            .filter_map(|r| Some((between_periods(r, j, r.torque(j))?, r.counts(j))))
+            .filter_map(|r| {
+                let heard = self.heard(r, j);
+                let sound = heard.iter().filter(|h| **h).count();
+                Some((between_periods(r, &heard, r.torque(j))?, sound))
+            })
             .collect();
         let dt = used().find(|r| r.cycle.is_some()).map(|r| r.dt);
         if let Some(dt) = dt {
@@ -39,13 +42,29 @@ impl Data<'_> {
         noise
     }
 
+    /// Records that tell the noise. Those of the holdout may hold what the fitted ones do not: only where those do not
+    /// repeat.
+    fn telling(&self) -> impl Iterator<Item = &Series> {
+        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
+        self.records.iter().filter(move |r| r.fit || !repeats)
+    }
+
+    /// Samples that tell the noise of an actuator: those that count, or, where it stands in all those records, all that
+    /// were measured. A torque sensor is as noisy at rest.
+    fn heard<'r>(&self, r: &'r Series, j: usize) -> Cow<'r, [bool]> {
+        match self.telling().any(|r| r.counts(j) > 0) {
+            true => r.counted(j),
+            false => Cow::Borrowed(&r.measured),
+        }
+    }
+
     /// Least noise of an actuator: a share of the torques in the fitted records. A simulator's log has none at all, and
     /// what its steps leave would be a gap.
     fn least_noise(&self, j: usize) -> f64 {
         let (mut power, mut count) = (0.0, 0.0f64);
         for r in self.records.iter().filter(|r| r.fit) {
-            let counted = r.counted(j);
-            let kept = r.torque(j).iter().zip(counted.iter()).filter(|(_, c)| **c);
+            let heard = self.heard(r, j);
+            let kept = r.torque(j).iter().zip(heard.iter()).filter(|(_, c)| **c);
             kept.for_each(|(v, _)| {
                 power += v * v;
                 count += 1.0;
@@ -57,9 +76,7 @@ impl Data<'_> {
     /// Spectrum of the torque that unresolved acceleration makes.
     fn position_excess(&self, j: usize) -> Vec<f64> {
         let mut out = vec![0.0; LINES + 1];
-        let repeats = self.records.iter().any(|r| r.fit && r.cycle.is_some());
-        let counts = |r: &&Series| r.cycle.is_some() && (r.fit || !repeats);
-        let records: Vec<&Series> = self.records.iter().filter(counts).collect();
+        let records: Vec<&Series> = self.telling().filter(|r| r.cycle.is_some()).collect();
         for r in &records {
             let variance = (self.inertia[j] * r.position_noise[j]).powi(2) / records.len() as f64;
             for (l, out) in out.iter_mut().enumerate() {

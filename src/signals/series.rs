@@ -304,7 +304,13 @@ impl Series {
 }
 
 /// Where each actuator stands still, actuator-major; empty where none ever does. `periods` are averaged.
-fn standing(plant: &Plant, motion: &Samples, noise: &[f64], periods: usize, dt: f64) -> Vec<bool> {
+pub fn standing(
+    plant: &Plant,
+    motion: &Samples,
+    noise: &[f64],
+    periods: usize,
+    dt: f64,
+) -> Vec<bool> {
     let band = if periods > 1 { BAND } else { SMOOTH };
     let mut all = Vec::with_capacity(motion.q.len());
     for (j, actuator) in plant.actuators().into_iter().enumerate() {

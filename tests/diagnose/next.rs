@@ -147,7 +147,6 @@ fn stribeck_and_viscous_friction_of_an_h4_are_told_apart() {
 }
 
 #[test]
-#[ignore = "no motion is proposed: the evidence of the motions that are tried is not finite"]
 fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
     let effect = Some((Field::Stribeck, "leg2=60,0.15"));
     let mut case = Case::new("hexapod", effect, 1.0, 0.4, None);
@@ -163,7 +162,6 @@ fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
 }
 
 #[test]
-#[ignore = "no motion is proposed: the evidence of the motions that are tried is not finite"]
 fn what_the_records_of_an_arm_cannot_show_is_shown() {
     let mut case = Case::new("ur5e", None, 1.0, 1.0, Some(1));
     let (before, n) = case.propose();

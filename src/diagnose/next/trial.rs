@@ -8,7 +8,7 @@ use crate::diagnose::finding::Finding;
 use crate::diagnose::search;
 use crate::diagnose::thresholds::THRESHOLDS as T;
 use crate::log::Payload;
-use crate::signals::series::Series;
+use crate::signals::series::{Series, standing};
 use crate::trajectory::Fourier;
 
 /// How closely a motion is looked at: most samples of a period, and shapes of an effect.
@@ -163,18 +163,23 @@ impl Trial<'_> {
         let count = wanted.clamp(T.next.least_samples, detail.samples);
         let x = motion.motion(count);
         let n = self.data.joints();
+        let dt = motion.period / count as f64;
+        let actuators = plant.actuator_motion(&x).ok()?;
+        // what hardly moves will count as standing, and tell nothing
+        let noise = &self.data.records.first()?.position_noise;
+        let standing = standing(plant, &actuators, noise, PERIODS as usize, dt);
         let record = Series {
             name: "next".into(),
             fit: true,
-            dt: motion.period / count as f64,
+            dt,
             count,
             cycle: Some(count),
-            actuators: plant.actuator_motion(&x).ok()?,
+            actuators,
             x,
             reference: None,
             tau: vec![0.0; n * count],
             measured: vec![true; count],
-            standing: Vec::new(),
+            standing,
             position_noise: vec![0.0; n],
             band: T.next.band,
             payload: Payload::None,
