@@ -12,7 +12,11 @@ use excite::calibrate::{self, Kind, Settings, Stats, Tolerances, poses};
 use std::path::PathBuf;
 
 fn main() -> excite::Result<()> {
-    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or("h4_calibration".into()));
+    // a number is the number of repetitions of the other examples, and no folder
+    let named = std::env::args()
+        .nth(1)
+        .filter(|a| a.parse::<f64>().is_err());
+    let folder = PathBuf::from(named.unwrap_or("target/h4_calibration".into()));
     std::fs::create_dir_all(&folder).map_err(|e| excite::Error::io(&folder, e))?;
     let robot = calibrate::open("h4", None)?;
     let noise = [3e-4, 0.02_f64.to_radians()];

@@ -2,52 +2,12 @@
 //! its turn, dead play that gravity closes. Each is linear in one number, so that `q + Σ η_k z_k(q)` takes the
 //! place of the reading `q`.
 
+use super::feature::{Feature, Shape};
 use super::serial::Link;
 use super::unknown::{Part, Unknown};
 use crate::dynamics::{Samples, Tree, Workspace};
 use crate::robot::{Inertia, Motion, Robot};
 use nalgebra::{Matrix3, Vector3};
-
-/// How `z` depends on the posture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Shape {
-    /// torque that gravity puts on the joint, N m or N
-    Torque,
-    /// `sin q`
-    Sine,
-    /// `cos q`
-    Cosine,
-    /// sign of the torque that gravity puts on the joint; soft within [`Feature::soft`]
-    Sign,
-}
-
-/// One column: `z` of one joint.
-#[derive(Debug, Clone)]
-pub struct Feature {
-    /// index of the joint among those that are measured
-    pub joint: usize,
-    /// what it stands for
-    pub part: Part,
-    /// its course
-    pub shape: Shape,
-    /// torque below which the side of the play is not decided, N m or N
-    pub soft: f64,
-    /// the unknown
-    pub unknown: Unknown,
-}
-
-impl Feature {
-    /// The turn of a joint itself.
-    pub fn turn(joint: usize) -> Self {
-        Feature {
-            joint,
-            part: Part::Geometry,
-            shape: Shape::Torque,
-            soft: 1.0,
-            unknown: Unknown::new(String::new(), "rad", Part::Geometry, 1.0),
-        }
-    }
-}
 
 /// Change of the joint's position under gravity that is expected of the joint that bears most, rad.
 const SAG: f64 = 3e-3;

@@ -1,7 +1,7 @@
 //! Errors of all rows, and which of them do not belong to the rest.
 
-use super::file::Kind;
 use super::frame::log;
+use super::kind::Kind;
 use super::model::Model;
 use super::rows::Value;
 use super::start::median;

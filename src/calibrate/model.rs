@@ -10,25 +10,19 @@
 //! | plane, gauge | `nᵀ p_be − d − reading`, `n, d` unknown |
 //! | distance | `|c_1 − c_2| − value` |
 
-use super::effects::{self, Feature};
-use super::file::{Calibration, Kind};
+use super::effects;
+use super::feature::Feature;
+use super::file::Calibration;
 use super::frame::{Frame, left_jacobian_inverse, log, right_jacobian};
+use super::kin::Kin;
+use super::kind::Kind;
+use super::layout::{Layout, Start};
 use super::parallel::Parallel;
 use super::rows::{Row, Value};
-use super::serial::{Arm, Posed};
-use super::unknown::{Part, Unknown};
+use super::serial::Posed;
+use super::unknown::Unknown;
 use crate::error::Result;
-use crate::robot::Motion;
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
-
-/// The robot's kinematics with its errors.
-#[derive(Debug)]
-pub enum Kin {
-    /// a chain of joints
-    Arm(Arm),
-    /// a platform on several chains
-    Parallel(Box<Parallel>),
-}
 
 /// How poses of a parallel robot enter the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -58,101 +52,6 @@ impl Default for Settings {
             orientation: true,
         }
     }
-}
-
-impl Kin {
-    /// Geometric unknowns.
-    pub fn unknowns(&self, tolerance: [f64; 2]) -> Vec<Unknown> {
-        match self {
-            Kin::Arm(arm) => arm.unknowns(tolerance),
-            Kin::Parallel(p) => p.unknowns(tolerance),
-        }
-    }
-
-    /// Number of geometric unknowns.
-    pub fn errors(&self) -> usize {
-        match self {
-            Kin::Arm(arm) => arm.errors(),
-            Kin::Parallel(p) => p.errors(),
-        }
-    }
-
-    /// Kinds of the joints that are measured.
-    pub fn motions(&self, joints: usize) -> Vec<Motion> {
-        let mut all = vec![Motion::Revolute; joints];
-        match self {
-            Kin::Arm(arm) => {
-                for l in &arm.links {
-                    all[l.coordinate] = l.body.motion;
-                }
-            }
-            Kin::Parallel(p) => {
-                for (motion, &a) in all.iter_mut().zip(&p.mechanism.actuated) {
-                    *motion = p.mechanism.robot.joints[a].motion;
-                }
-            }
-        }
-        all
-    }
-
-    /// Pose with nominal geometry.
-    ///
-    /// # Errors
-    /// Joint readings that no pose gives.
-    pub fn nominal(&self, q: &[f64]) -> Result<Frame> {
-        match self {
-            Kin::Arm(arm) => Ok(arm.pose(q, &vec![0.0; arm.errors()], &[], &[]).frame),
-            Kin::Parallel(p) => p.nominal(q),
-        }
-    }
-
-    /// Pose and Jacobian.
-    ///
-    /// # Errors
-    /// Joint readings that no pose gives.
-    pub fn pose(
-        &self,
-        q: &[f64],
-        x: &[f64],
-        features: &[Feature],
-        rate: &[f64],
-        near: Option<&Frame>,
-    ) -> Result<Posed> {
-        match self {
-            Kin::Arm(arm) => Ok(arm.pose(q, x, features, rate)),
-            Kin::Parallel(p) => match near {
-                Some(near) => p.pose(q, x, near),
-                None => p.pose(q, x, &p.nominal(q)?),
-            },
-        }
-    }
-}
-
-/// Standard deviation of the reading of an actuator, rad or m.
-const ENCODER: f64 = 1e-5;
-
-/// Where the unknowns of the set-up begin, by measurement.
-#[derive(Debug, Clone, Default)]
-pub struct Layout {
-    /// six numbers of the camera or tracker
-    pub camera: Vec<Option<usize>>,
-    /// of the target: six numbers, three for a tracker
-    pub target: Vec<Option<usize>>,
-    /// three numbers of the point or plane
-    pub contact: Vec<Option<usize>>,
-}
-
-/// Start of the unknowns of the set-up, by measurement.
-#[derive(Debug, Clone, Default)]
-pub struct Start {
-    /// base in the camera's frame
-    pub camera: Vec<Frame>,
-    /// target on the frame
-    pub target: Vec<Frame>,
-    /// point, base axes
-    pub socket: Vec<Vector3<f64>>,
-    /// unit normal, and distance of the plane along it
-    pub plane: Vec<(Vector3<f64>, f64)>,
 }
 
 /// Residuals with the columns they depend on.
@@ -209,71 +108,7 @@ impl<'a> Model<'a> {
         let mut unknowns = kin.unknowns([input.prior.length, input.prior.angle]);
         unknowns.extend(features.iter().map(|f| f.unknown.clone()));
         let of_robot = unknowns.len();
-        let mut layout = Layout::default();
-        let wide = [input.prior.pose_length, input.prior.pose_angle];
-        for (m, measured) in input.measurements.iter().enumerate() {
-            let earlier = input.measurements[..m]
-                .iter()
-                .position(|o| o.kind.has_instrument() && o.instrument == measured.instrument);
-            let (mut camera, mut target, mut contact) = (None, None, None);
-            let name = |what: &str| match input.measurements.len() {
-                1 => what.to_string(),
-                _ => format!("{what}({})", measured.instrument),
-            };
-            match (measured.kind, earlier) {
-                (Kind::Pose | Kind::Position, Some(o)) => {
-                    (camera, target) = (layout.camera[o], layout.target[o]);
-                }
-                (Kind::Pose, None) => {
-                    camera = Some(unknowns.len());
-                    unknowns.extend(Unknown::frame(&name("camera"), Part::Camera, wide));
-                    target = Some(unknowns.len());
-                    unknowns.extend(Unknown::frame(&name("target"), Part::Target, wide));
-                }
-                (Kind::Position, None) => {
-                    camera = Some(unknowns.len());
-                    unknowns.extend(Unknown::frame(&name("tracker"), Part::Camera, wide));
-                    target = Some(unknowns.len());
-                    let frame = Unknown::frame(&name("target"), Part::Target, wide);
-                    unknowns.extend(frame.into_iter().take(3));
-                }
-                (Kind::Point, _) => {
-                    contact = Some(unknowns.len());
-                    for n in ["x", "y", "z"] {
-                        unknowns.push(Unknown {
-                            scale: 0.01,
-                            ..Unknown::new(
-                                format!("{}.{n}", measured.file),
-                                "m",
-                                Part::Socket,
-                                f64::INFINITY,
-                            )
-                        });
-                    }
-                }
-                (Kind::Plane | Kind::Gauge, _) => {
-                    contact = Some(unknowns.len());
-                    for (n, unit, scale) in [
-                        ("tilt1", "rad", 0.01),
-                        ("tilt2", "rad", 0.01),
-                        ("d", "m", 0.01),
-                    ] {
-                        unknowns.push(Unknown {
-                            scale,
-                            ..Unknown::new(
-                                format!("{}.{n}", measured.file),
-                                unit,
-                                Part::Plane,
-                                f64::INFINITY,
-                            )
-                        });
-                    }
-                }
-            }
-            layout.camera.push(camera);
-            layout.target.push(target);
-            layout.contact.push(contact);
-        }
+        let layout = Layout::new(input, &mut unknowns);
         let row = |(i, r): (usize, &Row)| {
             effects::rates(&features, &r.q, torques.map(|t| t[i].as_slice()))
         };
@@ -508,112 +343,6 @@ impl<'a> Model<'a> {
                 Some(plain(vec![r], columns, j))
             }
         }
-    }
-
-    /// Whitened residuals of the actuators (and of the orientation) of a parallel robot at a measured pose.
-    fn actuator_block(
-        &self,
-        p: &Parallel,
-        row: usize,
-        x: &[f64],
-        measured: &Frame,
-    ) -> Option<Block> {
-        let data = &self.input.rows[row];
-        let m = data.measurement;
-        let n = self.of_robot;
-        let (camera, target) = (self.camera(m, x), self.target(m, x));
-        let seen = match self.consistent {
-            true => camera.then(&self.posed(row, x).ok()?.frame).then(&target),
-            false => *measured,
-        };
-        let at_target = camera.inverse().then(&seen);
-        let base = at_target.then(&target.inverse());
-        let implicit = self.settings.algorithm == Algorithm::Implicit;
-        let a = p.actuators_at(&base, &data.q, &x[..n], implicit);
-        let held = match self.settings.orientation {
-            true => p.held().len(),
-            false => 0,
-        };
-        let actuators = a.value.len();
-        let lines = actuators + held;
-        let mut r = DVector::zeros(lines);
-        let mut by_pose = DMatrix::zeros(lines, 6);
-        let c = self.layout.camera[m].unwrap_or(0);
-        let t = self.layout.target[m].unwrap_or(0);
-        let columns: Vec<usize> = (0..n).chain(c..c + 6).chain(t..t + 6).collect();
-        let mut j = DMatrix::zeros(lines, columns.len());
-        r.rows_mut(0, actuators).copy_from(&a.value);
-        by_pose.rows_mut(0, actuators).copy_from(&a.by_pose);
-        j.view_mut((0, 0), (actuators, n)).copy_from(&a.by_errors);
-        if held > 0 {
-            let (value, by) = p.orientation(&base.r);
-            r.rows_mut(actuators, held).copy_from(&value);
-            by_pose.view_mut((actuators, 3), (held, 3)).copy_from(&by);
-        }
-        // how the pose in the base follows camera and target, and the noise of what is seen
-        let mut moves = DMatrix::zeros(6, 12);
-        let mut noise = Matrix6::zeros();
-        let put = |m: &mut DMatrix<f64>, col: usize, shift: Vector3<f64>, turn: Vector3<f64>| {
-            for k in 0..3 {
-                m[(k, col)] = shift[k];
-                m[(3 + k, col)] = turn[k];
-            }
-        };
-        let cw = Vector3::new(x[c + 3], x[c + 4], x[c + 5]);
-        let tw = Vector3::new(x[t + 3], x[t + 4], x[t + 5]);
-        let (camera_turns, target_turns) = (right_jacobian(&cw), at_target.r * right_jacobian(&tw));
-        let camera_shifts = camera.r.transpose() * self.start.camera[m].r;
-        let target_shifts = base.r * self.start.target[m].r;
-        let arm = base.p - at_target.p;
-        for k in 0..3 {
-            let w = -camera_turns.column(k).into_owned();
-            put(
-                &mut moves,
-                k,
-                -camera_shifts.column(k).into_owned(),
-                Vector3::zeros(),
-            );
-            put(&mut moves, 3 + k, w.cross(&base.p), w);
-            let w = -target_turns.column(k).into_owned();
-            put(
-                &mut moves,
-                6 + k,
-                -target_shifts.column(k).into_owned(),
-                Vector3::zeros(),
-            );
-            put(&mut moves, 9 + k, w.cross(&arm), w);
-            let back = camera.r.transpose();
-            let (shift, turn) = (back.column(k).into_owned(), back.column(k).into_owned());
-            let swing = turn.cross(&arm);
-            for i in 0..3 {
-                noise[(i, k)] = shift[i];
-                noise[(i, 3 + k)] = swing[i];
-                noise[(3 + i, 3 + k)] = turn[i];
-            }
-        }
-        j.view_mut((0, n), (lines, 12))
-            .copy_from(&(&by_pose * &moves));
-        let spread = match data.covariance {
-            Some(c) => c,
-            None => {
-                let [s, a] = self.input.measurements[m].std;
-                Matrix6::from_diagonal(&[s * s, s * s, s * s, a * a, a * a, a * a].into())
-            }
-        };
-        let carried = &by_pose * noise;
-        let mut covariance = &carried * spread * carried.transpose() * (self.noise * self.noise);
-        for i in 0..actuators {
-            covariance[(i, i)] += (a.by_reading[i] * ENCODER).powi(2);
-        }
-        if r.iter().chain(j.iter()).any(|v| !v.is_finite()) {
-            return None;
-        }
-        let l = covariance.cholesky()?.l();
-        Some(Block {
-            r: l.solve_lower_triangular(&r)?,
-            columns,
-            j: l.solve_lower_triangular(&j)?,
-        })
     }
 
     /// `W` with `Wᵀ W` the inverse covariance of a pose.

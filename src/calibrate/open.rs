@@ -1,7 +1,7 @@
 //! The robot of a calibration: its chain, its joints, and the texts that a calibrated file is written from.
 
 use super::frame::Frame;
-use super::model::Kin;
+use super::kin::Kin;
 use super::parallel::Parallel;
 use super::serial::{Arm, Link};
 use crate::error::{Error, Result};

@@ -190,16 +190,14 @@ fn residuals(found: &Calibrated) -> Section {
     };
     let errors = Figure {
         description: "errors of all rows before and after".into(),
-        width: Figure::WIDTH,
         height: 190.0,
         columns: 1,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
         share_x: true,
         panels: vec![
             panel("before", &|r| r.before, Vec::new()),
             panel("after", &|r| r.after, rules),
         ],
+        ..Figure::default()
     };
     let along = found.joints.iter().enumerate().map(|(k, name)| {
         let of = |fit: bool| -> Vec<[f64; 2]> {
@@ -218,13 +216,10 @@ fn residuals(found: &Calibrated) -> Section {
     });
     let spread = Figure {
         description: "errors over the readings of each joint".into(),
-        width: Figure::WIDTH,
         height: 120.0,
         columns: 4,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels: along.collect(),
+        ..Figure::default()
     };
     let legend = html::legend(&[
         (Colour::BLUE, Shape::Dots, "fit"),
@@ -347,18 +342,15 @@ fn identifiability(found: &Calibrated) -> Section {
     let o = i.observability;
     let figure = Figure {
         description: "singular values of the scaled Jacobian".into(),
-        width: Figure::WIDTH,
         height: 190.0,
         columns: 1,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels: vec![singular_values(
             "whitened residuals a tolerance",
             "singular value",
             &i.singular_values,
             i.rank,
         )],
+        ..Figure::default()
     };
     let rows: Vec<Vec<Markup>> = i
         .confounded
@@ -420,18 +412,15 @@ fn tool(found: &Calibrated) -> Section {
     };
     let figure = Figure {
         description: "predicted uncertainty of the tool over the workspace".into(),
-        width: Figure::WIDTH,
         height: 170.0,
         columns: 2,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels: vec![
             panel("distance from the base axis, m", &|r| {
                 r.position[0].hypot(r.position[1])
             }),
             panel("height in the base, m", &|r| r.position[2]),
         ],
+        ..Figure::default()
     };
     let all: Vec<f64> = found.rows.iter().map(|r| r.predicted).collect();
     let s = Stats::of(&all);

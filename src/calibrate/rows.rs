@@ -2,8 +2,8 @@
 //!
 //! Without a header the columns are the joint readings, then those of [`Kind::columns`].
 
-use super::file::{Kind, Purpose};
 use super::frame::Frame;
+use super::kind::{Kind, Purpose};
 use crate::error::{Error, Result, Warning, WarningKind};
 use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;

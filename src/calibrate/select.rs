@@ -4,7 +4,7 @@
 //! (without groups, every fifth row), and the errors of the rows left out are compared pairwise. Rows held out
 //! take no part.
 
-use super::effects::Feature;
+use super::feature::Feature;
 use super::file::Calibration;
 use super::fit::Plan;
 use super::judge;
@@ -154,12 +154,12 @@ impl Search<'_, '_> {
             free: Vec::new(),
             robust: true,
         };
-        whole.free = super::seen(&model, &whole);
+        whole.free = super::robust::seen(&model, &whole);
         let parts: Vec<Vec<f64>> = (0..self.folds.iter().flatten().max().map_or(0, |m| m + 1))
             .map(|fold| of(&|f| f != fold))
             .collect();
         let x = vec![0.0; model.count()];
-        let start = super::robustly(&mut model, &mut whole, &x)?;
+        let start = super::robust::robustly(&mut model, &mut whole, &x)?;
         let mut out = vec![f64::NAN; self.folds.len()];
         for (fold, weights) in parts.iter().enumerate() {
             let weights: Vec<f64> = weights
@@ -175,9 +175,9 @@ impl Search<'_, '_> {
                 free: Vec::new(),
                 robust: true,
             };
-            plan.free = super::seen(&model, &plan);
+            plan.free = super::robust::seen(&model, &plan);
             let fit = super::fit::solve(&model, &plan, &start.x)?;
-            let x = super::set_up_rest(&model, &plan, &fit.x)?;
+            let x = super::robust::set_up_rest(&model, &plan, &fit.x)?;
             let errors = judge::errors(&model, &x);
             for (i, f) in self.folds.iter().enumerate() {
                 if *f == Some(fold) {
@@ -203,7 +203,7 @@ impl Search<'_, '_> {
             free: Vec::new(),
             robust: true,
         };
-        plan.free = super::seen(&model, &plan);
+        plan.free = super::robust::seen(&model, &plan);
         let fit = super::fit::solve(&model, &plan, &vec![0.0; model.count()])?;
         let Some(at) = super::fit::normal(&model, &plan, &fit.x, true) else {
             return Ok(f64::NAN);

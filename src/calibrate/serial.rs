@@ -7,7 +7,7 @@
 //! neighbouring frame expresses as well are told apart by their tolerances alone
 //! (see [`identifiable`](super::identifiable)).
 
-use super::effects::Feature;
+use super::feature::Feature;
 use super::frame::{Frame, right_jacobian};
 use super::unknown::{Part, Unknown};
 use crate::robot::{Body, Motion};

@@ -5,9 +5,11 @@
 //! `R_beᵀ R_cbᵀ R_ct`, and `p_ct = p_cb + R_cb p_be + R_cb R_be p_et` is linear in what is left. Two rounds leave out
 //! the worst third of the rows.
 
-use super::file::{Calibration, Kind};
+use super::file::Calibration;
 use super::frame::{Frame, log, nearest_rotation};
-use super::model::{Kin, Start};
+use super::kin::Kin;
+use super::kind::Kind;
+use super::layout::Start;
 use super::rows::Value;
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};

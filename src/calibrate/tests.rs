@@ -1,9 +1,12 @@
 //! Jacobians against differences, counts against the literature, and calibrations of robots whose errors are known.
 
-use super::effects::{Feature, features};
+use super::effects::features;
+use super::feature::Feature;
 use super::fit::Plan;
 use super::frame::{Frame, exp};
-use super::model::{Algorithm, Kin, Model, Settings, Start};
+use super::kin::Kin;
+use super::layout::Start;
+use super::model::{Algorithm, Model, Settings};
 use super::rows::{Row, Value};
 use super::*;
 use nalgebra::Vector3;
@@ -188,8 +191,12 @@ fn jacobians_of_a_serial_robot_are_those_of_differences() {
     for name in ["ur5e", "scara"] {
         let opened = open(name, None).unwrap();
         let (c, start) = mixed(&opened, r);
-        let gravity =
-            Gravity::of(opened.plant.robot().clone(), &opened.joints, String::new()).unwrap();
+        let gravity = super::effects::Gravity::of(
+            opened.plant.robot().clone(),
+            &opened.joints,
+            String::new(),
+        )
+        .unwrap();
         let q: Vec<Vec<f64>> = c.rows.iter().map(|r| r.q.clone()).collect();
         let t = gravity.torques(&q);
         let motions = opened.kin.motions(opened.joints.len());

@@ -1,14 +1,13 @@
 //! The calibrated robot: the file that was read, with other geometry and nothing else changed.
 
 use super::frame::Frame;
-use super::model::Kin;
+use super::kin::Kin;
 use super::open::Opened;
+pub use super::write_parallel::TOML;
 use crate::error::{Error, Result};
 
 /// Name of the calibrated URDF.
 pub const URDF: &str = "robot.urdf";
-/// Name of the file that refers to it, where the robot was read from one.
-pub const TOML: &str = "robot.toml";
 
 /// Files of the calibrated robot: names and texts. `x` are the geometric errors.
 ///

@@ -2,12 +2,14 @@
 
 use super::open::Opened;
 use super::parallel::Parallel;
-use super::write::TOML;
 use crate::error::{Error, Result};
 use crate::mechanism::dimensions::Dimensions;
 use crate::mechanism::parallelogram::motor_frame_about;
 use nalgebra::Vector3;
 use toml::{Table, Value};
+
+/// Name of the file that refers to it, where the robot was read from one.
+pub const TOML: &str = "robot.toml";
 
 fn numbers(v: &Vector3<f64>) -> Value {
     Value::Array(v.iter().map(|&x| Value::Float(x)).collect())

@@ -32,7 +32,8 @@ use super::{Mechanism, MechanismWorkspace};
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::robot::Robot;
-use crate::trajectory::certificate::{Certificate, JointCertificate, Proof, TOLERANCE};
+use crate::trajectory::bounds::TOLERANCE;
+use crate::trajectory::certificate::{Certificate, JointCertificate, Proof};
 use crate::trajectory::{Fourier, TorqueBound, certify};
 
 /// Samples of a period for what is sampled.

@@ -181,6 +181,22 @@ pub struct Figure {
     pub panels: Vec<Panel>,
 }
 
+impl Default for Figure {
+    /// Takes the whole page, one panel a row, no headings.
+    fn default() -> Self {
+        Figure {
+            description: String::new(),
+            width: Figure::WIDTH,
+            height: 150.0,
+            columns: 1,
+            column_titles: Vec::new(),
+            row_titles: Vec::new(),
+            share_x: false,
+            panels: Vec::new(),
+        }
+    }
+}
+
 impl Figure {
     /// Width of a figure that takes the whole page, pixels.
     pub const WIDTH: f64 = 1040.0;

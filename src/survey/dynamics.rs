@@ -1,12 +1,13 @@
 //! Joints, signs and units of columns by the torques of the robot's nominal model.
 
 use super::claim::{Claim, Means};
+use super::contradict::contradict;
 use super::families::{blocks, families};
 use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
-use super::search::{Hypothesis, Match, Problem, Signals};
+use super::search::{Hypothesis, Problem, Signals};
 use super::units::{extent, fits};
-use super::verdict::{LIKELY_SIGN, SHARE, Verdict, contradicts, explained, orientation};
+use super::verdict::{LIKELY_SIGN, Verdict, explained, orientation};
 use crate::dynamics::Workspace;
 use crate::error::{Warning, WarningKind};
 use crate::plant::Plant;
@@ -148,15 +149,14 @@ fn look(
     }
     let verdict = Verdict::of(&problem, best, &found, &allowed, n);
     let trusted = stated_all && claims.iter().any(|c| c.evidence.contains("its name"));
-    let mut ws = Workspace::default();
-    let matches = problem.matches(best, &mut ws);
     if trusted {
         contradict(
-            &problem, &stated, best, &verdict, &matches, claims, &positions, &torques, plant,
-            warnings,
+            &problem, &stated, best, &verdict, claims, &positions, &torques, plant, warnings,
         );
         return;
     }
+    let mut ws = Workspace::default();
+    let matches = problem.matches(best, &mut ws);
     let usual = orientation(best, &verdict, &matches, claims, &positions, &torques);
     for j in 0..n {
         let k = positions[best.column[j]];
@@ -330,123 +330,4 @@ fn followers(claims: &mut [Claim], positions: &[usize]) {
         claims[k].confidence = claims[k].confidence.min(claims[*p].confidence);
     }
     inherit(claims);
-}
-
-/// States, and their seed, that a joint is weighed by.
-const STATES: (usize, u64) = (100, 0x11_67);
-/// Torque of a joint, as a share of the largest of the robot, below which a sign alone is not judged by it: friction
-/// and armature that the model lacks are as large.
-const LIGHT: f64 = 0.05;
-
-/// Whether the model's torques of a joint are small beside those of the others.
-fn light(plant: &Plant, j: usize) -> bool {
-    let states = plant.random_states(STATES.0, STATES.1);
-    let Ok(torque) = plant.nominal_torque(&states) else {
-        return true;
-    };
-    let power: Vec<f64> = torque
-        .chunks(states.count.max(1))
-        .map(|of| of.iter().map(|x| x * x).sum())
-        .collect();
-    let largest = power.iter().copied().fold(0.0, f64::max);
-    power.get(j).is_none_or(|p| *p < LIGHT * LIGHT * largest)
-}
-
-/// Compares what is stated with what the torques say; contradictions are warnings with the evidence.
-#[allow(clippy::too_many_arguments)]
-fn contradict(
-    problem: &Problem,
-    stated: &Hypothesis,
-    best: &Hypothesis,
-    verdict: &Verdict,
-    matches: &[Vec<Match>],
-    claims: &mut [Claim],
-    positions: &[usize],
-    torques: &[usize],
-    plant: &Plant,
-    warnings: &mut Vec<Warning>,
-) {
-    let joints = plant.actuators();
-    let n = joints.len();
-    let differs = stated != best && contradicts(problem, best, stated);
-    for j in 0..n {
-        let (stated_k, best_k) = (positions[stated.column[j]], positions[best.column[j]]);
-        let same = stated_k == best_k && best.sign[j] == stated.sign[j];
-        if same || !verdict.sure(j) || !differs {
-            if same && verdict.sure(j) && explained(matches, j, torques) {
-                claims[stated_k].confidence = claims[stated_k].confidence.max(0.98);
-                claims[stated_k]
-                    .evidence
-                    .push_str("; the model's torques confirm joint and sign");
-            }
-            continue;
-        }
-        // a turned sign alone must be as clear as that
-        let mut back = best.clone();
-        back.sign[j] = -best.sign[j];
-        if stated_k == best_k && (light(plant, j) || !contradicts(problem, best, &back)) {
-            continue;
-        }
-        let what = match stated_k == best_k {
-            true => "with the sign turned".to_string(),
-            false => format!(
-                "as column {}{}",
-                claims[best_k].column,
-                if best.sign[j] < 0.0 {
-                    " with the sign turned"
-                } else {
-                    ""
-                }
-            ),
-        };
-        warnings.push(Warning::new(
-            WarningKind::UnitSuspect,
-            &joints[j].name,
-            format!(
-                "its position is stated to be column {}, but the model explains the torques clearly better {what}: is \
-                 it swapped or turned?",
-                claims[stated_k].column
-            ),
-        ));
-        claims[stated_k].confidence = 0.3;
-    }
-    // signs and gains of stated torques
-    for (c, &k) in torques.iter().enumerate() {
-        let Some(j) = claims[k]
-            .at
-            .filter(|_| matches!(claims[k].means, Means::Torque | Means::Current))
-        else {
-            continue;
-        };
-        let Some(m) = matches.get(j).map(|r| r[c]) else {
-            continue;
-        };
-        if differs || m.rigid < 0.5 || m.share < SHARE {
-            continue;
-        }
-        let gain = m.gain * claims[k].factor();
-        if claims[k].means == Means::Current {
-            claims[k].sign = m.gain.signum();
-            claims[k].scale = 1.0 / m.gain.abs();
-            claims[k]
-                .evidence
-                .push_str("; gain from the nominal model, good to a few parts in ten");
-            claims[k].confidence = claims[k].confidence.max(0.9);
-        } else if gain < 0.0 {
-            warnings.push(Warning::new(
-                WarningKind::UnitSuspect,
-                &claims[k].column,
-                format!(
-                    "it counts against the torque of {}: its sign is turned",
-                    joints[j].name
-                ),
-            ));
-            claims[k].sign = -claims[k].sign;
-        } else {
-            claims[k].confidence = claims[k].confidence.max(0.97);
-        }
-        if m.weightless && m.rigid > 0.8 {
-            claims[k].without = vec!["gravity"];
-        }
-    }
 }

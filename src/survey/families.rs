@@ -10,7 +10,7 @@ use crate::plant::Plant;
 const AHEAD: f64 = 0.6;
 
 /// Least share of what friction leaves that the bodies explain, for a gain to be told.
-const RIGID: f64 = 0.3;
+const RIGID: f64 = 0.4;
 
 /// Columns of torques and currents: joint, gain, what is missing in them.
 #[allow(clippy::too_many_arguments)]

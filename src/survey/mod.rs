@@ -10,6 +10,7 @@
 
 mod check;
 mod claim;
+mod contradict;
 mod dynamics;
 mod experiment;
 mod families;

@@ -1,6 +1,7 @@
 //! Magnitudes that are sampled, with a bound of what happens between the samples.
 
-use super::certificate::TOLERANCE;
+/// A limit counts as kept when it is exceeded by no more than this part of its range.
+pub const TOLERANCE: f64 = 1e-9;
 
 /// The largest torque of one joint over all time, against its limit.
 ///

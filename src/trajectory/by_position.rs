@@ -49,7 +49,7 @@ pub struct PositionPeak {
 impl PositionPeak {
     /// Whether the proven share stays within the limit.
     pub fn satisfied(&self) -> bool {
-        self.bound <= 1.0 + super::certificate::TOLERANCE
+        self.bound <= 1.0 + super::bounds::TOLERANCE
     }
 }
 

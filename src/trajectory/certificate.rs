@@ -1,15 +1,12 @@
 //! The certificate: position, velocity, acceleration and jerk limits over all time.
 
-use super::bounds::{SampledBound, TorqueBound};
+use super::bounds::{SampledBound, TOLERANCE, TorqueBound};
 use super::by_position::{PositionPeak, velocity_by_position};
 use super::extrema::{Extremum, extrema};
-use super::fourier::Fourier;
+use super::fourier::{Fourier, check};
 use super::tool::ToolCertificate;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::robot::Robot;
-
-/// A limit counts as kept when it is exceeded by no more than this part of its range.
-pub const TOLERANCE: f64 = 1e-9;
 
 /// Kinds of limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -401,20 +398,4 @@ pub fn certify(robot: &Robot, trajectory: &Fourier) -> Result<Certificate> {
         })
         .collect();
     Ok(Certificate::new(joints))
-}
-
-/// Whether the trajectory is well-formed and has the robot's joints.
-pub(super) fn check(robot: &Robot, trajectory: &Fourier) -> Result<()> {
-    if let Err((place, message)) = trajectory.check() {
-        return Err(Error::Argument(format!("trajectory, {place}: {message}")));
-    }
-    if robot.dof() != trajectory.dof() {
-        return Err(Error::Argument(format!(
-            "the trajectory has {} joints, robot {:?} has {}; use the robot it was designed for",
-            trajectory.dof(),
-            robot.name,
-            robot.dof()
-        )));
-    }
-    Ok(())
 }

@@ -1,6 +1,7 @@
 //! Finite Fourier series of the joints: the motion and all its derivatives in closed form.
 
 use crate::error::{Error, Result};
+use crate::robot::Robot;
 use std::f64::consts::TAU;
 
 /// Largest harmonic number accepted.
@@ -281,6 +282,22 @@ pub fn sample_period(fourier: &Fourier) -> crate::dynamics::Samples {
     let most = (NUMBERS / (10 * fourier.dof().max(1).pow(2))).max(5000);
     let count = ((fourier.period * RATE).round() as usize).clamp(20, most);
     fourier.motion(count)
+}
+
+/// Whether the trajectory is well-formed and has the robot's joints.
+pub(super) fn check(robot: &Robot, trajectory: &Fourier) -> Result<()> {
+    if let Err((place, message)) = trajectory.check() {
+        return Err(Error::Argument(format!("trajectory, {place}: {message}")));
+    }
+    if robot.dof() != trajectory.dof() {
+        return Err(Error::Argument(format!(
+            "the trajectory has {} joints, robot {:?} has {}; use the robot it was designed for",
+            trajectory.dof(),
+            robot.name,
+            robot.dof()
+        )));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! Speed and acceleration of the tool point over all time.
 
 use super::bounds::SampledBound;
-use super::certificate::check;
 use super::enclose::{Motion, enclose};
-use super::fourier::Fourier;
+use super::fourier::{Fourier, check};
 use super::jets::point_jet;
 use crate::dynamics::point::{Point, PointMotion};
 use crate::error::Result;

@@ -1,9 +1,8 @@
 //! Torque and its rate over all time: samples, and a proof of what happens between them.
 
 use super::bounds::{SampledBound, TorqueBound};
-use super::certificate::check;
 use super::enclose::{Enclosed, Motion, enclose};
-use super::fourier::Fourier;
+use super::fourier::{Fourier, check};
 use super::jets::Norms;
 use crate::error::{Error, Result};
 use crate::robot::{Joint, JointTerm, Robot};

@@ -261,6 +261,23 @@ fn wrong_statements_are_named_before_a_model_is_made() {
             .any(|w| w.kind == WarningKind::UnitSuspect && w.message.contains("swapped")),
         "{said:?}"
     );
+    // the positions of one joint turned, and the torques of another
+    let mut turned = q.clone();
+    turned[1].iter_mut().for_each(|x| *x = -*x);
+    let said = check(&plant, &[record(turned, tau.clone())]).unwrap();
+    assert!(
+        said.iter()
+            .any(|w| w.subject.contains("shoulder_lift") && w.message.contains("turned")),
+        "{said:?}"
+    );
+    let mut against = tau.clone();
+    against[2].iter_mut().for_each(|x| *x = -*x);
+    let said = check(&plant, &[record(q.clone(), against)]).unwrap();
+    assert!(
+        said.iter()
+            .any(|w| w.subject.contains("tau3") && w.message.contains("sign is turned")),
+        "{said:?}"
+    );
     // degrees are refused
     let degrees = q
         .iter()

@@ -1,9 +1,9 @@
 //! Postures that the robot can take.
 
 use super::Request;
-use crate::calibrate::file::Kind;
 use crate::calibrate::frame::Frame;
-use crate::calibrate::model::Kin;
+use crate::calibrate::kin::Kin;
+use crate::calibrate::kind::Kind;
 use crate::calibrate::open::Opened;
 use crate::calibrate::parallel::Parallel;
 use crate::collision::Scene;
@@ -158,7 +158,7 @@ impl<'a> Search<'a> {
                 .collect();
             found.extend(new);
             // a search with hardly any room ends early
-            if draws >= 20 * BATCH && found.len() * 100 < draws {
+            if draws >= 20 * BATCH && found.len() * 1000 < draws {
                 break;
             }
         }

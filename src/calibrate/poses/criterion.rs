@@ -1,7 +1,7 @@
 //! How well the tool is known after some of the candidates were measured.
 
 use super::Candidate;
-use crate::calibrate::file::Kind;
+use crate::calibrate::kind::Kind;
 use crate::calibrate::model::Model;
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, Vector3};

@@ -20,9 +20,11 @@ mod rehearse;
 
 pub use rehearse::{rehearse, toml};
 
-use super::file::{Calibration, Kind, Measurement, Tolerances};
+use super::file::{Calibration, Measurement, Tolerances};
 use super::frame::Frame;
-use super::model::{Model, Settings, Start};
+use super::kind::Kind;
+use super::layout::Start;
+use super::model::{Model, Settings};
 use super::open::Opened;
 use super::rows::{Row, Value};
 use crate::error::{Error, Result, Warning};

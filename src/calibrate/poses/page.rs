@@ -38,12 +38,8 @@ pub fn html(found: &Poses) -> String {
         .collect();
     let course = Figure {
         description: "predicted uncertainty over the number of postures".into(),
-        width: Figure::WIDTH,
         height: 200.0,
         columns: 1,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels: vec![Panel {
             x: Axis::whole("postures"),
             y: Axis::log("standard deviation of the tool, mm"),
@@ -56,6 +52,7 @@ pub fn html(found: &Poses) -> String {
             series: vec![Series::line(points, Colour::BLUE)],
             ..Panel::default()
         }],
+        ..Figure::default()
     };
     sections.push(Section::new(
         "How well the tool will be known",
@@ -96,13 +93,10 @@ pub fn html(found: &Poses) -> String {
     };
     let places = Figure {
         description: "where the frame is in the postures, from above and from the side".into(),
-        width: Figure::WIDTH,
         height: 260.0,
         columns: 2,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels: vec![dots(0, 1), dots(0, 2)],
+        ..Figure::default()
     };
     sections.push(Section::new(
         "Where they are",

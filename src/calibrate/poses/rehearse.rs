@@ -2,8 +2,8 @@
 
 use super::candidates::Search;
 use super::{Poses, Request};
-use crate::calibrate::file::Kind;
 use crate::calibrate::frame::{Frame, exp};
+use crate::calibrate::kind::Kind;
 use crate::calibrate::open::Opened;
 use crate::error::{Error, Result};
 use nalgebra::Vector3;

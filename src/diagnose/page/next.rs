@@ -29,13 +29,10 @@ fn proposed(n: &Proposal) -> Markup {
         .collect();
     let svg = Figure {
         description: "coordinates of the proposed motion over a period".into(),
-        width: Figure::WIDTH,
         height: 110.0,
         columns: n.units.len().clamp(1, 3),
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     figure(

@@ -38,13 +38,10 @@ pub(super) fn residuals(d: &Diagnosis) -> Markup {
         .collect();
     let svg = Figure {
         description: "residual of each joint over a period, before and after".into(),
-        width: Figure::WIDTH,
         height: 120.0,
         columns: if d.joints.len() > 1 { 2 } else { 1 },
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     let rows: Vec<Vec<Markup>> = (0..d.joints.len())
@@ -137,13 +134,10 @@ pub(super) fn maps(d: &Diagnosis) -> Markup {
     }
     let svg = Figure {
         description: "residual over velocity, position, torque and time".into(),
-        width: Figure::WIDTH,
         height: 150.0,
         columns: 4,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     figure(
@@ -180,13 +174,10 @@ pub(super) fn spectra(d: &Diagnosis) -> Markup {
         .collect();
     let svg = Figure {
         description: "spectrum of the residual before and after".into(),
-        width: Figure::WIDTH,
         height: 170.0,
         columns: few.len().max(1),
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     figure(

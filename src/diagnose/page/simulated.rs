@@ -37,13 +37,10 @@ pub(super) fn simulated(d: &Diagnosis) -> Markup {
         .collect();
     let svg = Figure {
         description: "deviation of the simulated robot from the log".into(),
-        width: Figure::WIDTH,
         height: 150.0,
         columns: d.joints.len().clamp(1, 3),
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     let mut rows = Vec::new();

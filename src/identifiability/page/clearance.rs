@@ -120,13 +120,11 @@ fn figure(e: &Excitation, c: &Clearances) -> Markup {
     };
     let svg = Figure {
         description: "Least distance of any two volumes over one period".into(),
-        width: Figure::WIDTH,
         height: 150.0,
         columns: 1,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
         share_x: true,
         panels: vec![panel],
+        ..Figure::default()
     }
     .svg();
     html::figure(

@@ -213,13 +213,10 @@ fn margins(e: &Excitation, p: &Platform) -> Markup {
     }
     let svg = Figure {
         description: "Passive joints and singular values along the path".into(),
-        width: Figure::WIDTH,
         height: 150.0,
         columns: panels.len().clamp(1, 3),
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     let rows: Vec<Vec<Markup>> = p

@@ -95,13 +95,12 @@ fn conditions(c: &crate::identifiability::ConditionNumbers, log_det: f64) -> Mar
 fn sheet(description: &str, panels: Vec<Panel>) -> String {
     Figure {
         description: description.into(),
-        width: Figure::WIDTH,
         height: 190.0,
         columns: panels.len(),
         column_titles: vec![],
         row_titles: vec![],
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg()
 }

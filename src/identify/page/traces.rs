@@ -198,13 +198,12 @@ pub(super) fn over_velocity(plant: &Plant, id: &Identification) -> Section {
     });
     let svg = Figure {
         description: "residual torque over joint velocity".into(),
-        width: Figure::WIDTH,
         height: 110.0,
         columns: traces.len().max(1),
         column_titles: titles(&traces),
         row_titles: rows(plant),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     let caption = html! {

@@ -4,7 +4,7 @@
 //! threads, straight into columns. In memory are the columns and one block, whatever the size of the
 //! file. Lines that are no rows are left out and named.
 
-use super::dialect::{Cell, Dialect, canonical, idle, stamp};
+use super::dialect::{Cell, Dialect, canonical, idle, stamp, strip};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Table, number};
 use rayon::prelude::*;
@@ -44,11 +44,6 @@ struct Piece {
 struct Left {
     count: usize,
     first: Vec<String>,
-}
-
-/// A text without the mark of its byte order.
-pub(super) fn strip(text: &[u8]) -> &[u8] {
-    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
 /// Reads a file; columns for which `wanted` is false are not kept (their column is empty). `check`

@@ -1,7 +1,6 @@
 //! How a text file of cells is laid out, found out from its first lines: delimiter, decimal comma, names,
 //! lists in cells, columns of texts and of stamps.
 
-use super::csv::strip;
 use crate::log::number;
 
 /// Lines that are looked at.
@@ -383,4 +382,9 @@ fn unique(names: Vec<String>) -> Vec<String> {
         out.push(other);
     }
     out
+}
+
+/// A text without the mark of its byte order.
+pub(super) fn strip(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }

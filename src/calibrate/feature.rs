@@ -1,0 +1,44 @@
+//! What a joint does beside turning by its reading, as one column that is linear in one number.
+
+use super::unknown::{Part, Unknown};
+
+/// How `z` depends on the posture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// torque that gravity puts on the joint, N m or N
+    Torque,
+    /// `sin q`
+    Sine,
+    /// `cos q`
+    Cosine,
+    /// sign of the torque that gravity puts on the joint; soft within [`Feature::soft`]
+    Sign,
+}
+
+/// One column: `z` of one joint.
+#[derive(Debug, Clone)]
+pub struct Feature {
+    /// index of the joint among those that are measured
+    pub joint: usize,
+    /// what it stands for
+    pub part: Part,
+    /// its course
+    pub shape: Shape,
+    /// torque below which the side of the play is not decided, N m or N
+    pub soft: f64,
+    /// the unknown
+    pub unknown: Unknown,
+}
+
+impl Feature {
+    /// The turn of a joint itself.
+    pub fn turn(joint: usize) -> Self {
+        Feature {
+            joint,
+            part: Part::Geometry,
+            shape: Shape::Torque,
+            soft: 1.0,
+            unknown: Unknown::new(String::new(), "rad", Part::Geometry, 1.0),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The robot's kinematics with its errors.
+
+use super::feature::Feature;
+use super::frame::Frame;
+use super::parallel::Parallel;
+use super::serial::{Arm, Posed};
+use super::unknown::Unknown;
+use crate::error::Result;
+use crate::robot::Motion;
+
+/// The robot's kinematics with its errors.
+#[derive(Debug)]
+pub enum Kin {
+    /// a chain of joints
+    Arm(Arm),
+    /// a platform on several chains
+    Parallel(Box<Parallel>),
+}
+
+impl Kin {
+    /// Geometric unknowns.
+    pub fn unknowns(&self, tolerance: [f64; 2]) -> Vec<Unknown> {
+        match self {
+            Kin::Arm(arm) => arm.unknowns(tolerance),
+            Kin::Parallel(p) => p.unknowns(tolerance),
+        }
+    }
+
+    /// Number of geometric unknowns.
+    pub fn errors(&self) -> usize {
+        match self {
+            Kin::Arm(arm) => arm.errors(),
+            Kin::Parallel(p) => p.errors(),
+        }
+    }
+
+    /// Kinds of the joints that are measured.
+    pub fn motions(&self, joints: usize) -> Vec<Motion> {
+        let mut all = vec![Motion::Revolute; joints];
+        match self {
+            Kin::Arm(arm) => {
+                for l in &arm.links {
+                    all[l.coordinate] = l.body.motion;
+                }
+            }
+            Kin::Parallel(p) => {
+                for (motion, &a) in all.iter_mut().zip(&p.mechanism.actuated) {
+                    *motion = p.mechanism.robot.joints[a].motion;
+                }
+            }
+        }
+        all
+    }
+
+    /// Pose with nominal geometry.
+    ///
+    /// # Errors
+    /// Joint readings that no pose gives.
+    pub fn nominal(&self, q: &[f64]) -> Result<Frame> {
+        match self {
+            Kin::Arm(arm) => Ok(arm.pose(q, &vec![0.0; arm.errors()], &[], &[]).frame),
+            Kin::Parallel(p) => p.nominal(q),
+        }
+    }
+
+    /// Pose and Jacobian.
+    ///
+    /// # Errors
+    /// Joint readings that no pose gives.
+    pub fn pose(
+        &self,
+        q: &[f64],
+        x: &[f64],
+        features: &[Feature],
+        rate: &[f64],
+        near: Option<&Frame>,
+    ) -> Result<Posed> {
+        match self {
+            Kin::Arm(arm) => Ok(arm.pose(q, x, features, rate)),
+            Kin::Parallel(p) => match near {
+                Some(near) => p.pose(q, x, near),
+                None => p.pose(q, x, &p.nominal(q)?),
+            },
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What was measured, and what it is for.
+
+use serde::Deserialize;
+
+/// What was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// pose of a target in the frame of a camera
+    Pose,
+    /// position of a point in the frame of a tracker
+    Position,
+    /// the frame's origin sits in a fixed point that is not known
+    Point,
+    /// the frame's origin touches a fixed plane that is not known
+    Plane,
+    /// a dial gauge reads the distance of the frame's origin from a fixed plane
+    Gauge,
+}
+
+impl Kind {
+    /// As the file writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Pose => "pose",
+            Kind::Position => "position",
+            Kind::Point => "point",
+            Kind::Plane => "plane",
+            Kind::Gauge => "gauge",
+        }
+    }
+
+    /// Columns behind the joint readings.
+    pub fn columns(self) -> &'static [&'static str] {
+        match self {
+            Kind::Pose => &["x", "y", "z", "qw", "qx", "qy", "qz"],
+            Kind::Position => &["x", "y", "z"],
+            Kind::Gauge => &["reading"],
+            Kind::Point | Kind::Plane => &[],
+        }
+    }
+
+    /// Noise where none is stated: m and rad.
+    pub(super) fn noise(self) -> [f64; 2] {
+        match self {
+            Kind::Pose => [3e-4, 3.5e-4],
+            Kind::Position => [5e-5, f64::NAN],
+            Kind::Point => [2e-4, f64::NAN],
+            Kind::Plane | Kind::Gauge => [5e-5, f64::NAN],
+        }
+    }
+
+    /// Whether poses of its instrument are unknown.
+    pub fn has_instrument(self) -> bool {
+        matches!(self, Kind::Pose | Kind::Position)
+    }
+}
+
+/// What rows are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Purpose {
+    /// unknowns are identified with them
+    Fit,
+    /// the result is judged by them
+    Holdout,
+}

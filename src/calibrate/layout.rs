@@ -1,0 +1,103 @@
+//! The unknowns of the set-up: which there are, and where they start.
+
+use super::file::Calibration;
+use super::frame::Frame;
+use super::kind::Kind;
+use super::unknown::{Part, Unknown};
+use nalgebra::Vector3;
+
+/// Where the unknowns of the set-up begin, by measurement.
+#[derive(Debug, Clone, Default)]
+pub struct Layout {
+    /// six numbers of the camera or tracker
+    pub camera: Vec<Option<usize>>,
+    /// of the target: six numbers, three for a tracker
+    pub target: Vec<Option<usize>>,
+    /// three numbers of the point or plane
+    pub contact: Vec<Option<usize>>,
+}
+
+/// Start of the unknowns of the set-up, by measurement.
+#[derive(Debug, Clone, Default)]
+pub struct Start {
+    /// base in the camera's frame
+    pub camera: Vec<Frame>,
+    /// target on the frame
+    pub target: Vec<Frame>,
+    /// point, base axes
+    pub socket: Vec<Vector3<f64>>,
+    /// unit normal, and distance of the plane along it
+    pub plane: Vec<(Vector3<f64>, f64)>,
+}
+
+impl Layout {
+    /// The unknowns of the set-up of all measurements, behind those that there are.
+    pub fn new(input: &Calibration, unknowns: &mut Vec<Unknown>) -> Self {
+        let mut layout = Layout::default();
+        let wide = [input.prior.pose_length, input.prior.pose_angle];
+        for (m, measured) in input.measurements.iter().enumerate() {
+            let earlier = input.measurements[..m]
+                .iter()
+                .position(|o| o.kind.has_instrument() && o.instrument == measured.instrument);
+            let (mut camera, mut target, mut contact) = (None, None, None);
+            let name = |what: &str| match input.measurements.len() {
+                1 => what.to_string(),
+                _ => format!("{what}({})", measured.instrument),
+            };
+            match (measured.kind, earlier) {
+                (Kind::Pose | Kind::Position, Some(o)) => {
+                    (camera, target) = (layout.camera[o], layout.target[o]);
+                }
+                (Kind::Pose, None) => {
+                    camera = Some(unknowns.len());
+                    unknowns.extend(Unknown::frame(&name("camera"), Part::Camera, wide));
+                    target = Some(unknowns.len());
+                    unknowns.extend(Unknown::frame(&name("target"), Part::Target, wide));
+                }
+                (Kind::Position, None) => {
+                    camera = Some(unknowns.len());
+                    unknowns.extend(Unknown::frame(&name("tracker"), Part::Camera, wide));
+                    target = Some(unknowns.len());
+                    let frame = Unknown::frame(&name("target"), Part::Target, wide);
+                    unknowns.extend(frame.into_iter().take(3));
+                }
+                (Kind::Point, _) => {
+                    contact = Some(unknowns.len());
+                    for n in ["x", "y", "z"] {
+                        unknowns.push(Unknown {
+                            scale: 0.01,
+                            ..Unknown::new(
+                                format!("{}.{n}", measured.file),
+                                "m",
+                                Part::Socket,
+                                f64::INFINITY,
+                            )
+                        });
+                    }
+                }
+                (Kind::Plane | Kind::Gauge, _) => {
+                    contact = Some(unknowns.len());
+                    for (n, unit, scale) in [
+                        ("tilt1", "rad", 0.01),
+                        ("tilt2", "rad", 0.01),
+                        ("d", "m", 0.01),
+                    ] {
+                        unknowns.push(Unknown {
+                            scale,
+                            ..Unknown::new(
+                                format!("{}.{n}", measured.file),
+                                unit,
+                                Part::Plane,
+                                f64::INFINITY,
+                            )
+                        });
+                    }
+                }
+            }
+            layout.camera.push(camera);
+            layout.target.push(target);
+            layout.contact.push(contact);
+        }
+        layout
+    }
+}
