@@ -1,6 +1,7 @@
 //! `calibration.toml`.
 
-use super::kind::{Kind, Purpose};
+use super::kind::{Held, Kind, Purpose};
+use super::pixels::{Camera, Optics};
 use super::rows::{self, Row};
 use crate::error::{Error, Result, Warning};
 use serde::Deserialize;
@@ -105,7 +106,7 @@ struct File {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
-    kind: Kind,
+    kind: Held,
     file: String,
     group: Option<String>,
     #[serde(rename = "use")]
@@ -113,7 +114,12 @@ struct Entry {
     std: Option<f64>,
     angle_std: Option<f64>,
     instrument: Option<String>,
+    camera: Option<Camera>,
+    target: Option<String>,
 }
+
+/// Noise of a coordinate in a picture where none is stated, pixels.
+const PIXEL_STD: f64 = 0.1;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -202,13 +208,15 @@ impl Calibration {
             entries.push((
                 0,
                 Entry {
-                    kind: Kind::Pose,
+                    kind: Held::Pose,
                     file: poses.clone(),
                     group: None,
                     purpose: None,
                     std: None,
                     angle_std: None,
                     instrument: None,
+                    camera: None,
+                    target: None,
                 },
             ));
         }
@@ -240,25 +248,40 @@ impl Calibration {
                     ),
                 ));
             }
-            let [usual, usual_angle] = entry.kind.noise();
-            let std = stated(entry.std, at, &file.std, "std", "m")?;
-            let angle = stated(entry.angle_std, at, &file.angle_std, "angle_std", "rad")?;
+            let kind = entry.kind.kind();
+            let [usual, usual_angle] = kind.noise();
+            let optics = optics(folder, &entry).map_err(|e| match e {
+                Error::Argument(what) => Error::file(path, place(at), what),
+                other => other,
+            })?;
+            // of pictures the noise is one of pixels, and that of the poses follows from it
+            let (std, angle) = match optics {
+                Some(_) => (None, None),
+                None => (
+                    stated(entry.std, at, &file.std, "std", "m")?,
+                    stated(entry.angle_std, at, &file.angle_std, "angle_std", "rad")?,
+                ),
+            };
             let table = rows::read(
                 &folder.join(&entry.file),
-                entry.kind,
+                kind,
+                optics.as_ref(),
                 &joints,
                 measurements.len(),
                 entry.purpose,
                 &mut warnings,
             )?;
-            noise_stated &= std.is_some() || table.iter().all(|r| r.covariance.is_some());
+            noise_stated &= match optics {
+                Some(_) => entry.std.is_some(),
+                None => std.is_some() || table.iter().all(|r| r.covariance.is_some()),
+            };
             all.extend(table);
-            let instrument = match entry.kind {
+            let instrument = match kind {
                 Kind::Pose => "camera",
                 _ => "tracker",
             };
             measurements.push(Measurement {
-                kind: entry.kind,
+                kind,
                 group: entry.group.unwrap_or_else(|| entry.file.clone()),
                 file: entry.file,
                 std: [std.unwrap_or(usual), angle.unwrap_or(usual_angle)],
@@ -326,6 +349,45 @@ impl Calibration {
         let name = &self.measurements[row.measurement].group;
         self.groups().iter().position(|g| g == name).unwrap_or(0)
     }
+}
+
+/// Camera and target of a measurement of kind "pixels"; `None` for the others.
+fn optics(folder: &Path, entry: &Entry) -> Result<Option<Optics>> {
+    let wrong = |what: String| Err(Error::Argument(what));
+    if entry.kind != Held::Pixels {
+        return match (&entry.camera, &entry.target) {
+            (None, None) => Ok(None),
+            _ => wrong("camera and target are for kind = \"pixels\"".into()),
+        };
+    }
+    let (Some(camera), Some(target)) = (entry.camera, &entry.target) else {
+        return wrong(
+            "kind = \"pixels\" needs camera = { fx = …, fy = …, cx = …, cy = … } in pixels and target = \"target.csv\" with the \
+             points of the target, x, y, z in m"
+                .into(),
+        );
+    };
+    let distortion = [camera.k1, camera.k2, camera.p1, camera.p2, camera.k3];
+    let all = [camera.cx, camera.cy].into_iter().chain(distortion);
+    if !(camera.fx > 0.0 && camera.fy > 0.0)
+        || !all.chain([camera.fx, camera.fy]).all(f64::is_finite)
+    {
+        return wrong("camera: fx and fy must be positive, and all numbers finite".into());
+    }
+    let std = entry.std.unwrap_or(PIXEL_STD);
+    if !(std.is_finite() && std > 0.0) {
+        return wrong(format!("std is {std}; it must be positive, in pixels"));
+    }
+    if entry.angle_std.is_some() {
+        return wrong(
+            "kind = \"pixels\" has no angle_std; std is that of a coordinate, in pixels".into(),
+        );
+    }
+    Ok(Some(Optics {
+        camera,
+        points: Optics::points(&folder.join(target))?,
+        std,
+    }))
 }
 
 /// A file beside another one, or the name of a bundled robot.

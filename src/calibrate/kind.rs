@@ -56,6 +56,37 @@ impl Kind {
     }
 }
 
+/// What a file of readings holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Held {
+    /// poses
+    Pose,
+    /// points of a target in pictures, from which poses are solved
+    Pixels,
+    /// positions
+    Position,
+    /// contacts with a point
+    Point,
+    /// contacts with a plane
+    Plane,
+    /// readings of a gauge
+    Gauge,
+}
+
+impl Held {
+    /// What is measured by it.
+    pub fn kind(self) -> Kind {
+        match self {
+            Held::Pose | Held::Pixels => Kind::Pose,
+            Held::Position => Kind::Position,
+            Held::Point => Kind::Point,
+            Held::Plane => Kind::Plane,
+            Held::Gauge => Kind::Gauge,
+        }
+    }
+}
+
 /// What rows are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -29,6 +29,7 @@ mod open;
 #[doc(hidden)]
 pub mod page;
 mod parallel;
+mod pixels;
 #[doc(hidden)]
 pub mod poses;
 mod result;

@@ -4,6 +4,7 @@
 
 use super::frame::Frame;
 use super::kind::{Kind, Purpose};
+use super::pixels::Optics;
 use crate::error::{Error, Result, Warning, WarningKind};
 use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -45,6 +46,9 @@ const TURNS: f64 = 7.0;
 /// Positions beyond this many metres are suspected to be millimetres.
 const FAR: f64 = 30.0;
 
+/// Deviation that poses leave of pictures, in stated standard deviations, beyond which the camera is doubted.
+const ROUGH: f64 = 2.0;
+
 /// Reads a file.
 ///
 /// # Errors
@@ -52,6 +56,7 @@ const FAR: f64 = 30.0;
 pub fn read(
     path: &Path,
     kind: Kind,
+    optics: Option<&Optics>,
     joints: &[String],
     measurement: usize,
     purpose: Option<Purpose>,
@@ -87,6 +92,10 @@ pub fn read(
     let cells = split(first);
     let header = cells.iter().any(|c| c.parse::<f64>().is_err());
     let n = joints.len();
+    let wanted: Vec<String> = match optics {
+        Some(o) => o.columns(),
+        None => kind.columns().iter().map(|c| c.to_string()).collect(),
+    };
     let usual = || (1..=n).map(|k| format!("q{k}"));
     let names: Vec<String> = match header {
         true => {
@@ -94,9 +103,7 @@ pub fn read(
             cells
         }
         false => {
-            let all: Vec<String> = usual()
-                .chain(kind.columns().iter().map(|c| c.to_string()))
-                .collect();
+            let all: Vec<String> = usual().chain(wanted.iter().cloned()).collect();
             if cells.len() != all.len() {
                 return Err(bad(
                     1,
@@ -119,12 +126,13 @@ pub fn read(
                 1,
                 format!(
                     "column `{name}` is missing; a measurement of kind \"{}\" has {}{}",
-                    kind.name(),
+                    if optics.is_some() {
+                        "pixels"
+                    } else {
+                        kind.name()
+                    },
                     usual().collect::<Vec<_>>().join(", "),
-                    kind.columns()
-                        .iter()
-                        .map(|c| format!(", {c}"))
-                        .collect::<String>()
+                    wanted.iter().map(|c| format!(", {c}")).collect::<String>()
                 ),
             )
         })
@@ -148,7 +156,7 @@ pub fn read(
         ));
     }
     let mut value_at = Vec::new();
-    for c in kind.columns() {
+    for c in &wanted {
         value_at.push(column(c)?);
     }
     let use_at = find("use");
@@ -164,6 +172,7 @@ pub fn read(
     }
     let mut rows = Vec::new();
     let mut unnormalised = 0;
+    let (mut lost, mut mistaken, mut rough) = (Vec::new(), 0, Vec::new());
     for (line, text) in lines {
         let cells = split(text);
         if cells.len() != names.len() {
@@ -186,15 +195,30 @@ pub fn read(
             .iter()
             .map(|&at| number(at))
             .collect::<Result<Vec<_>>>()?;
+        let unseen =
+            |at: usize| optics.is_some() && matches!(cells[at].as_str(), "" | "nan" | "NaN");
         let v = value_at
             .iter()
-            .map(|&at| number(at))
+            .map(|&at| if unseen(at) { Ok(f64::NAN) } else { number(at) })
             .collect::<Result<Vec<_>>>()?;
-        let value = match kind {
-            Kind::Point | Kind::Plane => Value::Contact,
-            Kind::Gauge => Value::Reading(v[0]),
-            Kind::Position => Value::Position(Vector3::new(v[0], v[1], v[2])),
-            Kind::Pose => {
+        let solved = match optics.map(|o| o.solve(&v)) {
+            None => None,
+            Some(Ok(pose)) => Some(pose),
+            Some(Err(why)) => {
+                lost.push((line, why));
+                continue;
+            }
+        };
+        if let Some(s) = solved {
+            mistaken += s.left_out;
+            rough.push(s.rms);
+        }
+        let value = match (kind, solved) {
+            (Kind::Point | Kind::Plane, _) => Value::Contact,
+            (Kind::Gauge, _) => Value::Reading(v[0]),
+            (Kind::Position, _) => Value::Position(Vector3::new(v[0], v[1], v[2])),
+            (Kind::Pose, Some(s)) => Value::Pose(s.pose),
+            (Kind::Pose, None) => {
                 let quaternion = Quaternion::new(v[3], v[4], v[5], v[6]);
                 let length = quaternion.norm();
                 if !(0.5..2.0).contains(&length) {
@@ -215,8 +239,9 @@ pub fn read(
                 })
             }
         };
-        let covariance = match (&cov_at, kind) {
-            (Some(at), Kind::Pose) => {
+        let covariance = match (&cov_at, solved) {
+            (_, Some(s)) => Some(s.covariance),
+            (Some(at), None) if kind == Kind::Pose => {
                 let c = at.iter().map(|&a| number(a)).collect::<Result<Vec<_>>>()?;
                 let m = Matrix6::from_row_slice(&c);
                 if (m - m.transpose()).amax() > 1e-6 * m.amax() || m.cholesky().is_none() {
@@ -249,6 +274,16 @@ pub fn read(
             fit: own.or(purpose).unwrap_or(Purpose::Fit) == Purpose::Fit,
         });
     }
+    if let (true, Some((line, why))) = (lost.len() > rows.len(), lost.first()) {
+        return Err(bad(
+            *line,
+            format!(
+                "{why}; so are {} of {} pictures: are camera, target and the order of its points right?",
+                lost.len(),
+                lost.len() + rows.len()
+            ),
+        ));
+    }
     if rows.is_empty() {
         return Err(Error::file(
             path,
@@ -259,6 +294,38 @@ pub fn read(
     let subject = path.display().to_string();
     let mut warn =
         |kind, message: String| warnings.push(Warning::new(kind, subject.clone(), message));
+    if let Some((line, why)) = lost.first() {
+        warn(
+            WarningKind::RowsLeftOut,
+            format!(
+                "{} of {} pictures tell no pose and were left out, the first in line {line}: {why}",
+                lost.len(),
+                lost.len() + rows.len()
+            ),
+        );
+    }
+    if let Some(o) = optics
+        && super::judge::middle(&rough) > ROUGH * o.std
+    {
+        warn(
+            WarningKind::UnitSuspect,
+            format!(
+                "poses leave {} pixels of the points, {} are stated: camera or target are not quite those of the pictures, \
+                 and what follows from them is worse than it says",
+                crate::error::number(super::judge::middle(&rough)),
+                crate::error::number(o.std)
+            ),
+        );
+    }
+    if mistaken > 0 {
+        warn(
+            WarningKind::RowsLeftOut,
+            format!(
+                "{mistaken} points of the target are seen where it has none, by more than five standard deviations; \
+                 they were left out"
+            ),
+        );
+    }
     if unnormalised > 0 {
         warn(
             WarningKind::UnitSuspect,

@@ -680,3 +680,99 @@ fn a_real_panda_and_its_spoiled_placement() {
         );
     }
 }
+
+/// Where a camera with radial distortion sees a point; written down apart from the one that is tested.
+fn pinhole(p: &Vector3<f64>) -> [f64; 2] {
+    let (a, b) = (p.x / p.z, p.y / p.z);
+    let stretch = 1.0 - 0.1 * (a * a + b * b);
+    [1000.0 + 1500.0 * stretch * a, 600.0 + 1500.0 * stretch * b]
+}
+
+#[test]
+fn an_h4_is_calibrated_from_the_pixels_of_its_pictures() {
+    let opened = open("h4", None).unwrap();
+    let exact = made(
+        &opened,
+        Kind::Pose,
+        [0.0; 2],
+        [0.002, 0.005],
+        [45, 60],
+        6,
+        0,
+    );
+    let r = &mut ChaCha8Rng::seed_from_u64(3);
+    // 9 × 7 corners of 20 mm
+    let board: Vec<Vector3<f64>> = (0..63)
+        .map(|k| Vector3::new(0.02 * f64::from(k % 9), 0.02 * f64::from(k / 9), 0.0))
+        .collect();
+    let n = opened.joints.len();
+    let line = |cells: Vec<f64>| {
+        let cells: Vec<String> = cells.iter().map(f64::to_string).collect();
+        cells.join(",") + "\n"
+    };
+    let corners = (1..=board.len()).map(|k| format!("u{k},v{k}"));
+    let joints: Vec<String> = (1..=n).map(|k| format!("q{k}")).collect();
+    let mut pictures = format!(
+        "{},{}\n",
+        joints.join(","),
+        corners.collect::<Vec<_>>().join(",")
+    );
+    let mut poses = format!("{},x,y,z,qw,qx,qy,qz\n", joints.join(","));
+    for row in &exact.rows {
+        let Value::Pose(seen) = row.value else {
+            panic!()
+        };
+        let mut cells = row.q.clone();
+        if row.fit {
+            for x in &board {
+                let u = pinhole(&(seen.r * x + seen.p));
+                cells.extend(u.map(|v| v + 0.1 * normal(r)));
+            }
+            pictures += &line(cells);
+        } else {
+            let q = nalgebra::UnitQuaternion::from_matrix(&seen.r);
+            cells.extend([seen.p.x, seen.p.y, seen.p.z, q.w, q.i, q.j, q.k]);
+            poses += &line(cells);
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let target: String = board.iter().map(|x| line(vec![x.x, x.y, x.z])).collect();
+    write("target.csv", &format!("x,y,z\n{target}"));
+    write("pictures.csv", &pictures);
+    write("poses.csv", &poses);
+    let text = "robot = \"h4\"\n[prior]\nlength = 0.002\nangle = 0.005\n[[measurement]]\nkind = \"pixels\"\nfile = \"pictures.csv\"\n\
+                target = \"target.csv\"\ncamera = { fx = 1500, fy = 1500, cx = 1000, cy = 600, k1 = -0.1 }\nstd = 0.1\n\
+                [[measurement]]\nkind = \"pose\"\nfile = \"poses.csv\"\nuse = \"holdout\"\nstd = 1e-5\nangle_std = 1e-5\n";
+    let path = folder.path().join("calibration.toml");
+    write("calibration.toml", text);
+    let (c, opened) = read(&path).unwrap();
+    assert!(c.warnings.is_empty(), "{:?}", c.warnings);
+    let (stats, found) = after(&opened, &c, Settings::default());
+    let [before, _] = found.errors(false, true);
+    let before = Stats::of(&before).unwrap();
+    // a tenth of a pixel is some hundredths of a millimetre at this distance
+    assert!(
+        stats.rms < 3e-4 && before.rms > 1e-3,
+        "{before:?} {stats:?}"
+    );
+    println!("H4 from pixels: {before:?} {stats:?}");
+    // what is wrong with the file is said
+    for (from, to, what) in [
+        ("target = \"target.csv\"\n", "", "needs camera"),
+        ("fx = 1500", "fx = -1", "positive"),
+        ("kind = \"pixels\"", "kind = \"pose\"", "are for kind"),
+        ("std = 0.1", "std = 0.1\nangle_std = 0.1", "no angle_std"),
+    ] {
+        write("calibration.toml", &text.replacen(from, to, 1));
+        let said = read(&path).map(|_| ()).unwrap_err().to_string();
+        assert!(said.contains(what), "{said}");
+    }
+    // another camera does not fit any picture
+    write("calibration.toml", &text.replace("fx = 1500", "fx = 300"));
+    let said = match read(&path) {
+        Err(e) => e.to_string(),
+        Ok((c, _)) => format!("{:?}", c.warnings),
+    };
+    assert!(said.contains("pixels"), "{said}");
+}
