@@ -16,8 +16,10 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ._command import Command
     from ._errors import Error, ExciteWarning, Interrupted, Notice
     from ._excite import __version__
+    from ._posterior import Posterior
     from ._records import Experiment, Record
     from ._results import (
         Assessment,
@@ -44,22 +46,27 @@ if TYPE_CHECKING:
         robots,
         simulate,
     )
+    from ._verify import Verification, verify
 
 #: What is imported when it is used first: NumPy takes longer than all of this package.
 _PARTS = {
+    "_command": ("Command",),
     "_errors": ("Error", "ExciteWarning", "Interrupted", "Notice"),
     "_excite": ("__version__",),
+    "_posterior": ("Posterior",),
     "_records": ("Experiment", "Record"),
     "_results": ("Assessment", "Calibration", "Design", "Diagnosis", "Export", "Identification", "Load", "Result", "Simulation"),
     "_robot": ("BaseParameters", "Parameter", "Robot"),
     "_trajectory": ("Motion", "Samples", "Trajectory"),
     "_verbs": ("assess", "calibrate", "design", "diagnose", "export", "formats", "identify", "load", "robots", "simulate"),
+    "_verify": ("Verification", "verify"),
 }
 
 __all__ = [
     "Assessment",
     "BaseParameters",
     "Calibration",
+    "Command",
     "Design",
     "Diagnosis",
     "Error",
@@ -72,12 +79,14 @@ __all__ = [
     "Motion",
     "Notice",
     "Parameter",
+    "Posterior",
     "Record",
     "Result",
     "Robot",
     "Samples",
     "Simulation",
     "Trajectory",
+    "Verification",
     "__version__",
     "assess",
     "calibrate",
@@ -89,6 +98,7 @@ __all__ = [
     "load",
     "robots",
     "simulate",
+    "verify",
 ]
 
 

@@ -6,7 +6,7 @@ import html as _html
 import json
 import os
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ._errors import Notice, notices, unusable
 from ._records import Payload, Record
 from ._robot import PathLike, Robot
 from ._trajectory import Motion, Trajectory
+
+if TYPE_CHECKING:
+    from ._posterior import Posterior
 
 
 def pandas() -> Any:
@@ -291,7 +294,7 @@ class Simulation:
 class Identification(Result):
     """An identified model."""
 
-    _may = ("robot.urdf", "robot.xml", "robot.toml")
+    _may = ("robot.urdf", "robot.xml", "robot.toml", "effects.py")
 
     def __init__(self, report: _excite.Report) -> None:
         super().__init__(report)
@@ -340,6 +343,14 @@ class Identification(Result):
     def base_covariance(self) -> Array:
         """Covariance of the base parameters, ``(b, b)``."""
         return np.array([_floats(row) for row in self._model["base_covariance"]])
+
+    def sample(self, n: int, seed: int = 0) -> "Posterior":
+        """``n`` robots that the data do not exclude, for what you randomise; all of them can exist."""
+        from ._posterior import sample
+
+        if int(n) != n or n < 1 or int(seed) != seed or seed < 0:
+            raise unusable(f"n and seed are whole numbers, n at least 1: not {n!r}, {seed!r}")
+        return sample(self, int(n), int(seed))
 
     @property
     def validation(self) -> Dict[str, Any]:
@@ -430,7 +441,7 @@ class Diagnosis(Result):
     """Why a model and its robot disagree."""
 
     _file = "diagnosis.json"
-    _may = ("robot.urdf", "robot.xml", "robot.toml", "next.json")
+    _may = ("robot.urdf", "robot.xml", "robot.toml", "effects.py", "next.json")
     _rows = "findings"
 
     @property

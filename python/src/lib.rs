@@ -43,6 +43,8 @@ fn _excite(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(verbs::calibrate, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::export, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::formats, m)?)?;
+    m.add_function(wrap_pyfunction!(verbs::series, m)?)?;
+    m.add_function(wrap_pyfunction!(verbs::energies, m)?)?;
     m.add_function(wrap_pyfunction!(main, m)?)?;
     Ok(())
 }

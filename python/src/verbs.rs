@@ -12,6 +12,7 @@ use excite::export::{Model, write};
 use excite::robot::Prior;
 use excite::{Error, Result, calibrate as calibration, diagnose as diagnosis};
 use excite::{identify as identification, load as payload, signals};
+use numpy::{IntoPyArray, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -299,4 +300,64 @@ pub fn export<'py>(
 pub fn formats() -> Vec<(&'static str, &'static str)> {
     let cards = FORMATS.iter().map(|f| f.card());
     cards.map(|c| (c.name, c.about)).collect()
+}
+
+/// The records as the diagnosis sees them: what a simulator needs to be compared with them.
+#[pyfunction]
+pub fn series<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'py, PyDict>> {
+    let core = experiment.core.clone();
+    let (all, noise) = simply(py, move |_| {
+        let data = diagnosis::prepare(&core.plant, &core.records)?;
+        let noise: Vec<f64> = data.noise.iter().map(|n| n.std).collect();
+        Ok((data.records, noise))
+    })?;
+    let out = PyDict::new(py);
+    let mut records = Vec::new();
+    for r in all {
+        let d = PyDict::new(py);
+        d.set_item("name", r.name)?;
+        d.set_item("holdout", !r.fit)?;
+        d.set_item("dt", r.dt)?;
+        d.set_item("referenced", r.reference.is_some())?;
+        d.set_item("measured", r.measured)?;
+        for (name, values) in [
+            ("q", r.actuators.q),
+            ("dq", r.actuators.qd),
+            ("ddq", r.actuators.qdd),
+            ("tau", r.tau),
+        ] {
+            d.set_item(name, values.into_pyarray(py))?;
+        }
+        records.push(d);
+    }
+    out.set_item("records", records)?;
+    out.set_item("noise", noise)?;
+    Ok(out)
+}
+
+/// Energies of the gap to models whose torques are given (actuator-major over the rows of all records): by model, record
+/// and actuator, in units of the noise variance.
+#[pyfunction]
+pub fn energies(
+    py: Python<'_>,
+    experiment: &Experiment,
+    models: Vec<PyReadonlyArray1<'_, f64>>,
+) -> PyResult<Vec<Vec<Vec<f64>>>> {
+    let core = experiment.core.clone();
+    let models: Vec<Vec<f64>> = models.iter().map(|m| m.as_array().to_vec()).collect();
+    simply(py, move |_| {
+        let data = diagnosis::prepare(&core.plant, &core.records)?;
+        let (rows, joints) = (data.rows(), data.joints());
+        if let Some(wrong) = models.iter().find(|m| m.len() != rows * joints) {
+            return Err(Error::Argument(format!(
+                "the torques of a model are {} numbers for {joints} joints and {rows} samples",
+                wrong.len()
+            )));
+        }
+        let of = |m: &Vec<f64>| {
+            let torque: Vec<Vec<f64>> = m.chunks(rows.max(1)).map(<[f64]>::to_vec).collect();
+            diagnosis::outside::energies(&data, &torque)
+        };
+        Ok(models.iter().map(of).collect())
+    })
 }
