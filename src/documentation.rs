@@ -17,6 +17,7 @@
 //! | [`diagnosis`] | how to read a diagnosis, and what to do next |
 //! | [`diagnosis_method`] | how the diagnosis works, with its equations, constants and catalogue |
 //! | [`diagnosis_results`] | what the diagnosis found on rehearsals and real robots |
+//! | [`python`] | the same from Python: functions, arrays, notebooks |
 //! | [`limits`] | what is not known, not proven, or not there |
 //! | [`withheld`] | how often the diagnosis is right |
 //! | [`results`], [`benchmarks`] | what was measured, and how to measure it again |
@@ -44,6 +45,7 @@ macro_rules! documents {
             #[doc = "[moves.md]: crate::documentation::moves"]
             #[doc = "[notation.md]: crate::documentation::notation"]
             #[doc = "[parallel.md]: crate::documentation::parallel"]
+            #[doc = "[python.md]: crate::documentation::python"]
             #[doc = "[results.md]: crate::documentation::results"]
             #[doc = "[run.md]: crate::documentation::run"]
             #[doc = "[simulation.md]: crate::documentation::simulation"]
@@ -73,6 +75,7 @@ documents! {
     moves "moves"
     notation "notation"
     parallel "parallel"
+    python "python"
     results "results"
     run "run"
     simulation "simulation"

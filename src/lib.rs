@@ -64,8 +64,13 @@
 // Modules and names under `#[doc(hidden)]` are internals that the program, the tests and the benchmarks use. They may
 // change at any time.
 
+// the command line is written as a program that uses this library
+extern crate self as excite;
+
 pub mod base;
 pub mod calibrate;
+#[doc(hidden)]
+pub mod cli;
 #[doc(hidden)]
 pub mod collision;
 #[doc(hidden)]

@@ -1,7 +1,5 @@
-//! `excite`: parse, run, print. Each command is a file in `cli/`.
-
-mod cli;
+//! `excite`: the program. Each command is a file in `cli/`.
 
 fn main() -> std::process::ExitCode {
-    cli::main()
+    excite::cli::main()
 }

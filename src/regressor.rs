@@ -70,6 +70,11 @@ impl Regressor {
         MatRef::from_column_major_slice(&self.w, self.dof * self.count, self.columns.len())
     }
 
+    /// The numbers of `W`, column by column.
+    pub fn into_columns(self) -> Vec<f64> {
+        self.w
+    }
+
     /// `W` with the rows of each joint divided by its torque noise.
     pub fn weighted(&self, torque_noise: &[f64]) -> Mat<f64> {
         let w = self.mat();

@@ -1,6 +1,6 @@
 //! `excite design ROBOT`.
 
-mod diagnostic;
+pub mod diagnostic;
 
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::design::diagnostic::PERIODS;
@@ -137,13 +137,7 @@ pub fn run(args: Args) -> Result<()> {
         threads: args.threads,
     };
     settings.check(plant.moved())?;
-    let length = args.rate * settings.period * f64::from(settings.periods);
-    if !(args.rate > 0.0 && args.rate.is_finite() && length <= 1e7) {
-        return Err(Error::Argument(format!(
-            "--rate must be more than 0 and give at most 1e7 samples, not {}",
-            args.rate
-        )));
-    }
+    check_rate(args.rate, &settings)?;
     let mut names = vec![
         "trajectory.json",
         "samples.csv",
@@ -216,8 +210,25 @@ pub fn run(args: Args) -> Result<()> {
     }
 }
 
+/// Refuses a rate of samples that cannot be.
+///
+/// # Errors
+/// [`Error::Argument`] with the rate.
+pub fn check_rate(rate: f64, settings: &Settings) -> Result<()> {
+    let length = rate * settings.period * f64::from(settings.periods);
+    match rate > 0.0 && rate.is_finite() && length <= 1e7 {
+        true => Ok(()),
+        false => Err(Error::Argument(format!(
+            "--rate must be more than 0 and give at most 1e7 samples, not {rate}"
+        ))),
+    }
+}
+
 /// Periods of the motion; a diagnosis wants at least three.
-fn periods(asked: Option<u32>, diagnostic: bool) -> Result<u32> {
+///
+/// # Errors
+/// Fewer for a diagnosis.
+pub fn periods(asked: Option<u32>, diagnostic: bool) -> Result<u32> {
     match (asked, diagnostic) {
         (None, false) => Ok(1),
         (None, true) => Ok(PERIODS),
@@ -230,7 +241,10 @@ fn periods(asked: Option<u32>, diagnostic: bool) -> Result<u32> {
 }
 
 /// Writes the samples of a motion.
-fn samples(
+///
+/// # Errors
+/// A rate that cannot be; a file that cannot be written; a pose that cannot be reached.
+pub fn samples(
     plant: &Plant,
     trajectory: &Trajectory,
     path: &Path,

@@ -6,7 +6,7 @@ use excite::mechanism::bundled as parallel;
 use excite::output::write_atomic;
 use excite::robot::{Motion, bundled};
 use excite::trajectory::Trajectory;
-use excite::{Error, Plant, Result};
+use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -150,14 +150,31 @@ pub fn run(args: Args) -> Result<()> {
     print(&out)
 }
 
-/// The robot that is named; otherwise the bundled one that the trajectory was designed for.
+/// The robot that is named; otherwise the bundled one.
 fn robot(spec: Option<&str>, trajectory: &Trajectory, path: &Path) -> Result<Option<Plant>> {
+    let named = spec.map(Plant::load).transpose()?;
+    let (plant, warnings) = robot_of(named, trajectory, path)?;
+    warn(&warnings);
+    Ok(plant)
+}
+
+/// The robot that is given, with what is imperfect in it; otherwise the bundled one that the trajectory was designed
+/// for.
+///
+/// # Errors
+/// A robot that the trajectory does not move.
+pub fn robot_of(
+    given: Option<Plant>,
+    trajectory: &Trajectory,
+    path: &Path,
+) -> Result<(Option<Plant>, Vec<Warning>)> {
     let name = trajectory.robot.as_str();
     let known = bundled::find(name).is_some() || parallel::find(name).is_some();
-    let plant = match spec {
-        Some(spec) => Plant::load(spec)?,
+    let stated = given.is_some();
+    let plant = match given {
+        Some(plant) => plant,
         None if known => Plant::load(name)?,
-        None => return Ok(None),
+        None => return Ok((None, Vec::new())),
     };
     let plant = plant
         .in_space(trajectory.space)
@@ -166,16 +183,15 @@ fn robot(spec: Option<&str>, trajectory: &Trajectory, path: &Path) -> Result<Opt
         Ok(warning) => Ok((plant, warning)),
         Err(e) => Err(Error::file(path, "", e.to_string())),
     });
-    match (spec, matched) {
-        (Some(_), Ok((plant, warning))) => {
-            warn(plant.warnings());
-            warn(&warning.into_iter().collect::<Vec<_>>());
-            Ok(Some(plant))
+    match (stated, matched) {
+        (true, Ok((plant, warning))) => {
+            let warnings = plant.warnings().iter().cloned().chain(warning).collect();
+            Ok((Some(plant), warnings))
         }
-        (Some(_), Err(e)) => Err(e),
+        (true, Err(e)) => Err(e),
         // another robot of the same name is not the one that is meant
-        (None, Ok((plant, None))) => Ok(Some(plant)),
-        (None, _) => Ok(None),
+        (false, Ok((plant, None))) => Ok((Some(plant), Vec::new())),
+        (false, _) => Ok((None, Vec::new())),
     }
 }
 
@@ -189,7 +205,7 @@ fn list() -> String {
 }
 
 /// What will run: parts, samples, and what happens between them.
-fn summary(playback: &Playback, card: &Card) -> String {
+pub fn summary(playback: &Playback, card: &Card) -> String {
     let mut out = String::new();
     let _ = write!(out, "{}: {}, ", playback.robot, card.name);
     let _ = match card.rates.offered.is_empty() {

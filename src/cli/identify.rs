@@ -134,22 +134,11 @@ pub fn run(args: Args) -> Result<()> {
 }
 
 /// The joint columns: those asked for, those of the file, or the usual ones where it lists none.
-fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> Result<Plant> {
-    let mut terms = Vec::new();
-    for name in asked
-        .unwrap_or_default()
-        .iter()
-        .filter(|n| n.as_str() != "none")
-    {
-        match JointTerm::ALL.into_iter().find(|t| t.name() == name) {
-            Some(t) => terms.push(t),
-            None => {
-                return Err(Error::Argument(format!(
-                    "--identify knows armature, viscous, coulomb, offset and none, not `{name}`"
-                )));
-            }
-        }
-    }
+///
+/// # Errors
+/// A name that there is not; terms of a parallel robot.
+pub fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> Result<Plant> {
+    let terms = super::terms(asked.unwrap_or_default())?;
     if plant.closed() {
         return match asked {
             Some(_) => Err(Error::Argument(

@@ -2,11 +2,11 @@
 //! unusable arguments. Nothing but results goes to standard output.
 
 mod calibrate;
-mod design;
+pub mod design;
 mod diagnose;
-mod export;
+pub mod export;
 mod identifiability;
-mod identify;
+pub mod identify;
 mod load;
 mod log;
 mod moves;
@@ -21,6 +21,7 @@ mod torque;
 use clap::{Parser, Subcommand};
 use excite::robot::JointTerm;
 use excite::{Error, Plant, Result, Warning, WarningKind};
+use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -60,7 +61,19 @@ enum Command {
 
 /// Runs the program.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    ExitCode::from(run(std::env::args_os()))
+}
+
+/// Runs the program with these arguments, the first of which is its name; gives the exit status.
+pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(args) {
+        Ok(cli) => cli,
+        Err(e) => {
+            // help and version are no mistakes; where nobody reads, nothing can be said
+            let _ = e.print();
+            return u8::try_from(e.exit_code()).unwrap_or(2);
+        }
+    };
     let done = match cli.command {
         Command::Design(a) => design::run(a),
         Command::Identifiability(a) => identifiability::run(a),
@@ -79,10 +92,10 @@ pub fn main() -> ExitCode {
         Command::New(a) => new::run(a),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(e) => {
             eprintln!("error: {e}");
-            ExitCode::from(if e.is_argument() { 2 } else { 1 })
+            if e.is_argument() { 2 } else { 1 }
         }
     }
 }
@@ -116,6 +129,14 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
     let Some(names) = identify else {
         return Ok(plant);
     };
+    Ok(plant.with_terms(&terms(names)?))
+}
+
+/// Joint columns by their names.
+///
+/// # Errors
+/// A name that there is not.
+pub fn terms(names: &[String]) -> Result<Vec<JointTerm>> {
     let mut terms = Vec::new();
     for name in names.iter().filter(|n| n.as_str() != "none") {
         match JointTerm::ALL.into_iter().find(|t| t.name() == name) {
@@ -127,7 +148,7 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
             }
         }
     }
-    Ok(plant.with_terms(&terms))
+    Ok(terms)
 }
 
 /// How collisions are looked at.
@@ -201,7 +222,7 @@ impl Folder {
 }
 
 /// Warnings about robot files that cannot be written; `values` names the file that has their numbers.
-fn unwritten(texts: &[(&'static str, Result<String>)], values: &str) -> Vec<Warning> {
+pub fn unwritten(texts: &[(&'static str, Result<String>)], values: &str) -> Vec<Warning> {
     let failed = texts
         .iter()
         .filter_map(|(name, text)| Some((name, text.as_ref().err()?)));
@@ -222,6 +243,6 @@ fn write(path: &Path, force: bool, text: &str) -> Result<()> {
 }
 
 /// JSON with a newline at the end.
-fn pretty(value: &serde_json::Value) -> String {
+pub fn pretty(value: &serde_json::Value) -> String {
     format!("{value:#}\n")
 }

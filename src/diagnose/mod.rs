@@ -46,6 +46,8 @@ pub mod next;
 pub(crate) mod noise;
 mod noise_floor;
 #[doc(hidden)]
+pub mod outside;
+#[doc(hidden)]
 pub mod page;
 pub(crate) mod payload;
 pub(crate) mod prior;

@@ -76,9 +76,32 @@ impl Record {
                 table.columns.push(column);
             }
         }
+        Self::from_table(name, table, plant, purpose, period, [None; 2])
+    }
+
+    /// A log that was made in memory, with columns of the names of a log; `part` is what counts of it, s from its
+    /// start.
+    ///
+    /// # Errors
+    /// As [`Record::read`]; columns of different lengths.
+    #[doc(hidden)]
+    pub fn from_table(
+        name: &str,
+        mut table: Table,
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+        part: [Option<f64>; 2],
+    ) -> Result<Record> {
         let path = Path::new(name);
-        table.warnings = check_names(&table, &plant.actuators(), path)?;
-        let mut record = Self::of_table(table, path, plant, purpose, period, [None; 2])?;
+        let rows = table.rows();
+        if table.names.len() != table.columns.len() || table.columns.iter().any(|c| c.len() != rows)
+        {
+            return Err(Error::file(path, "", "its columns differ in length"));
+        }
+        let unknown = check_names(&table, &plant.actuators(), path)?;
+        table.warnings.extend(unknown);
+        let mut record = Self::of_table(table, path, plant, purpose, period, part)?;
         record.name = name.into();
         Ok(record)
     }

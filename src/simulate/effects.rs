@@ -223,7 +223,8 @@ pub fn parse_payload(text: &str) -> Result<Inertia> {
         _ => Matrix3::new(v[4], v[5], v[6], v[5], v[7], v[8], v[6], v[8], v[9]),
     };
     let load = Inertia::from_com(v[0], Vector3::new(v[1], v[2], v[3]), tensor);
-    let (smallest, triangle) = load.realizability();
+    // as it is given: moved to the origin and back, the tensor of a point mass is rounding
+    let (smallest, triangle) = Inertia::from_com(v[0], Vector3::zeros(), tensor).realizability();
     if v[0] <= 0.0 || smallest < -1e-9 || triangle > 1e-9 {
         return Err(Error::Argument(format!(
             "--payload {text}: no body has such a mass and inertia (mass > 0; principal moments \
@@ -231,4 +232,18 @@ pub fn parse_payload(text: &str) -> Result<Inertia> {
         )));
     }
     Ok(load)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse_payload;
+
+    #[test]
+    fn point_masses_are_payloads_wherever_they_are() {
+        for text in ["0.8,0.02,0,0.1", "0.5,0,0,0.1", "3,-0.07,0.013,0.21"] {
+            let load = parse_payload(text).unwrap();
+            assert!(load.mass() > 0.0, "{text}");
+        }
+        assert!(parse_payload("1,0,0,0.1,1,0,0,0.1,0,0.1").is_err());
+    }
 }

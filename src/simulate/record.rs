@@ -201,8 +201,11 @@ pub fn write_log(
     })
 }
 
-/// Columns `x y z qw qx qy qz` of the platform.
-fn poses(plant: &Plant, run: &Run) -> Result<Vec<Vec<f64>>> {
+/// Columns `x y z qw qx qy qz` of the platform at all samples.
+///
+/// # Errors
+/// A robot without platform.
+pub fn poses(plant: &Plant, run: &Run) -> Result<Vec<Vec<f64>>> {
     let count = run.t.len();
     let Some(mechanism) = plant.mechanism() else {
         return Err(Error::Argument(format!(

@@ -31,6 +31,9 @@ pub struct Set {
 
 impl Set {
     /// Makes and certifies the motions about the designed one.
+    ///
+    /// # Errors
+    /// As [`diagnostic_set`].
     pub fn new(plant: &Plant, main: &Trajectory, settings: &Settings) -> Result<Self> {
         let motions = diagnostic_set(plant, main, settings)?
             .into_iter()
@@ -43,6 +46,9 @@ impl Set {
     }
 
     /// Writes trajectories, samples and `experiment.toml`; the first motion is there already.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
     pub fn write(
         &self,
         plant: &Plant,
@@ -87,7 +93,13 @@ impl Set {
         out
     }
 
-    fn experiment(&self, name: &str, robot: &str) -> String {
+    /// The motions, the designed one first.
+    pub fn motions(&self) -> impl Iterator<Item = &Motion> {
+        self.motions.iter().map(|(m, _)| m)
+    }
+
+    /// The experiment that waits for the logs of a robot called `name`, whose file is `robot`.
+    pub fn experiment(&self, name: &str, robot: &str) -> String {
         let quoted = |text: &str| toml::Value::String(text.into()).to_string();
         let mut out = format!(
             "# Diagnostic experiment of {name}, made by `excite design --diagnostic`.\n\

@@ -1,0 +1,149 @@
+"""A model in MuJoCo: inverse dynamics along a motion, and steps under a command."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import tempfile
+from pathlib import Path
+from types import ModuleType
+from typing import Any, List, Optional, Tuple
+
+import numpy as np
+
+from ._arrays import Array
+from ._command import Command
+from ._errors import unusable
+
+#: Largest step of the simulation, s.
+STEP = 1e-3
+
+
+def mujoco() -> Any:
+    """MuJoCo, or how to get it."""
+    try:
+        import mujoco as found
+    except ImportError:
+        raise unusable('the simulator "mujoco" needs MuJoCo: pip install mujoco') from None
+    return found
+
+
+def _module(text: str) -> ModuleType:
+    """A generated ``effects.py``."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "effects.py")
+        path.write_text(text, encoding="utf-8")
+        spec = importlib.util.spec_from_file_location("excite_effects", path)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+
+class Model:
+    """A robot file for MuJoCo, with the file of effects beside it where there is one."""
+
+    def __init__(self, xml: str, effects: Optional[str], joints: List[str], name: str) -> None:
+        mj = self._mj = mujoco()
+        try:
+            self._model = mj.MjModel.from_xml_string(xml)
+        except ValueError as e:
+            raise unusable(f"MuJoCo does not load the {name} model: {e}") from None
+        self._effects = None if effects is None else _module(effects)
+        self.name = name
+        self._joints = [self._model.joint(j) for j in joints]
+        self._at = np.array([int(j.qposadr[0]) for j in self._joints])
+        self._dof = np.array([int(j.dofadr[0]) for j in self._joints])
+        bits = mj.mjtDisableBit
+        # limits and contacts are not what is compared
+        self._model.opt.disableflags |= int(bits.mjDSBL_CONTACT) | int(bits.mjDSBL_LIMIT)
+        self._drives = self._actuators()
+        self._own_step = float(self._model.opt.timestep)
+        #: whether something in it goes on by itself, so that a run needs a time before it
+        self.remembers = self._model.nv > len(joints) or bool(getattr(self._effects, "REMEMBERED", []))
+
+    def _actuators(self) -> Optional[Array]:
+        """Actuators in the order of the joints, where every joint has one."""
+        found = []
+        for joint in self._joints:
+            own = np.flatnonzero(self._model.actuator_trnid[:, 0] == joint.id)
+            if len(own) != 1:
+                return None
+            found.append(int(own[0]))
+        return np.array(found)
+
+    def inverse(self, q: Array, dq: Array, ddq: Array, dt: float) -> Array:
+        """Torque that the drives report along a motion, ``(samples, joints)``."""
+        self._model.opt.timestep = self._own_step
+        if self._effects is not None:
+            return np.asarray(self._effects.inverse(self._model, q, dq, ddq, dt), float)
+        mj, data = self._mj, self._mj.MjData(self._model)
+        tau = np.zeros_like(q)
+        for i in range(len(q)):
+            data.qpos[self._at], data.qvel[self._dof], data.qacc[self._dof] = q[i], dq[i], ddq[i]
+            mj.mj_inverse(self._model, data)
+            tau[i] = data.qfrc_inverse[self._dof]
+        gains = np.ones(len(self._at))
+        if self._drives is not None:
+            gains = self._model.actuator_gainprm[self._drives, 0] * self._model.actuator_gear[self._drives, 0]
+        out: Array = tau / gains
+        return out
+
+    def run(self, q0: Array, dq0: Array, command: Command, dt: float, before: Optional[Command] = None) -> Array:
+        """Positions under a command, one row for each of its samples; ``before`` is played first."""
+        mj, effects = self._mj, self._effects
+        steps = max(int(math.ceil(dt / STEP - 1e-9)), 1)
+        self._model.opt.timestep = dt / steps
+        data = mj.MjData(self._model)
+        previous = mj.get_mjcb_passive()
+        try:
+            if effects is not None:
+                effects.install(self._model)
+            if before is not None:
+                self._set(data, before.q[0], before.dq[0])
+                self._play(data, before, steps)
+            self._set(data, q0, dq0)
+            return self._play(data, command, steps)
+        finally:
+            mj.set_mjcb_passive(previous)
+
+    def _set(self, data: Any, q: Array, dq: Array) -> None:
+        if self._effects is not None:
+            zero = np.zeros_like(q)
+            way, rate, _ = self._effects.displacement(q, dq, zero)
+            q, dq = q + way, dq + rate
+        data.qpos[self._at], data.qvel[self._dof] = q, dq
+        self._mj.mj_forward(self._model, data)
+
+    def _read(self, data: Any) -> "Tuple[Array, Array]":
+        q, dq = data.qpos[self._at], data.qvel[self._dof]
+        return (q if self._effects is None else np.asarray(self._effects.encoder(q))), dq
+
+    def _play(self, data: Any, command: Command, steps: int) -> Array:
+        mj = self._mj
+        late = np.zeros(len(self._at))
+        for j, seconds in getattr(self._effects, "DELAYED", []):
+            late[j] = seconds
+        out = np.empty_like(command.q)
+        for i in range(command.steps + 1):
+            q, dq = self._read(data)
+            out[i] = q
+            if not np.isfinite(q).all() or np.abs(q - command.q[i]).max() > 1e3:
+                out[i:] = np.nan
+                break
+            for s in range(steps if i < command.steps else 0):
+                t = (i + s / steps) * command.dt
+                if s:
+                    q, dq = self._read(data)
+                tau = command(t, q, dq)
+                for j in np.flatnonzero(late):
+                    # what the log shows now was done a while ago
+                    tau[j] += command.recorded(min(t + late[j], command.duration))[2][j] - command.recorded(t)[2][j]
+                if self._effects is not None:
+                    tau = np.asarray(self._effects.command(tau))
+                if self._drives is None:
+                    data.qfrc_applied[self._dof] = tau
+                else:
+                    data.ctrl[self._drives] = tau
+                mj.mj_step(self._model, data)
+        return out

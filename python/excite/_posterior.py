@@ -1,0 +1,229 @@
+"""What to randomise: robots that the data do not exclude.
+
+Bodies are sampled about the identified ones in coordinates that only bodies that can exist have: the pseudo-inertia is
+``J = L exp(S) L'`` with ``J0 = L L'`` identified and ``S`` symmetric; friction and armature are ``x0 exp(s)``. In these
+coordinates the prior of the identification, of strength ``gamma``, is ``gamma |S|^2 / 2`` to second order, and the data
+know the base parameters ``pi = T phi`` with their covariance ``C``:
+
+    precision = (T dphi/dS)' C^-1 (T dphi/dS) + gamma
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple, Union
+
+import numpy as np
+
+from . import _excite
+from ._arrays import Array, from_columns
+from ._errors import unusable
+from ._robot import PathLike, Robot
+
+if TYPE_CHECKING:
+    from ._records import Experiment
+    from ._results import Identification
+
+#: Symmetric unit matrices of order four, of length one.
+_PAIRS = [(i, j) for i in range(4) for j in range(i, 4)]
+
+
+def _units() -> Array:
+    out = np.zeros((10, 4, 4))
+    for k, (i, j) in enumerate(_PAIRS):
+        out[k, i, j] = out[k, j, i] = 1.0 if i == j else np.sqrt(0.5)
+    return out
+
+
+def pseudo(ten: Array) -> Array:
+    """Pseudo-inertia of mass, first moments, and the tensor about the origin xx, xy, xz, yy, yz, zz."""
+    m, x, y, z, xx, xy, xz, yy, yz, zz = ten
+    half = 0.5 * (xx + yy + zz)
+    sigma = np.array([[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]])
+    out = np.zeros((4, 4))
+    out[:3, :3], out[:3, 3], out[3, :3], out[3, 3] = sigma, (x, y, z), (x, y, z), m
+    return out
+
+
+def ten_of(j: Array) -> Array:
+    """The ten parameters of a pseudo-inertia."""
+    s, h, m = j[:3, :3], j[:3, 3], j[3, 3]
+    tensor = np.trace(s) * np.eye(3) - s
+    upper = tensor[np.triu_indices(3)]
+    return np.concatenate([[m], h, upper])
+
+
+class Posterior:
+    """Samples of what the data and the prior leave open. Made by :meth:`excite.Identification.sample`."""
+
+    def __init__(self, robot: Robot, names: List[str], units: List[str], values: Array, best: Array) -> None:
+        #: the identified robot
+        self.robot = robot
+        #: names of the parameters
+        self.names = names
+        #: their units
+        self.units = units
+        #: one row a sample, ``(n, p)``
+        self.values = values
+        #: the identified values, ``(p,)``
+        self.best = best
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def files(self, k: int) -> Dict[str, str]:
+        """The robot files of a sample: texts by name."""
+        found = self.robot._plant.files(self.values[k].tolist())
+        return {name: text for name, text, _ in found if text is not None}
+
+    def sampled(self, k: int) -> Robot:
+        """The robot of a sample."""
+        files = self.files(k)
+        return Robot._from_files({n: t for n, t in files.items() if n != "robot.xml"}, "robot.toml")
+
+    def to_frame(self) -> Any:
+        """One row a sample as a pandas ``DataFrame``."""
+        from ._results import pandas
+
+        return pandas().DataFrame(self.values, columns=self.names)
+
+    def save(self, folder: PathLike, *, force: bool = False) -> List[Path]:
+        """Write ``samples.csv`` and a folder of robot files for each sample."""
+        folder = Path(os.fspath(folder))
+        text = _excite.table(self.names, [np.ascontiguousarray(c) for c in self.values.T])
+        paths = _excite.save(folder, [("samples.csv", text.encode())], [], force)
+        for k in range(len(self)):
+            files = [(n, t.encode()) for n, t in self.files(k).items()]
+            paths += _excite.save(folder / f"sample_{k + 1:04d}", files, [], force)
+        return paths
+
+    def torque(self, q: Any, dq: Any = None, ddq: Any = None) -> Array:
+        """Torques of all samples, N m or N, ``(n, samples, joints)``; states as for :meth:`excite.Robot.torque`."""
+        y = self.robot.regressor(q, dq, ddq)
+        known = self.robot.torque(q, dq, ddq, 0.0 * self.best)
+        tau: Array = np.einsum("sjp,np->nsj", y, self.values, optimize=True) + known
+        return tau
+
+    def coverage(self, experiment: "Union[Experiment, PathLike]", level: float = 0.95) -> Dict[str, Any]:
+        """How much of the held-out torque lies in the band of the samples.
+
+        The band is that of the samples and of what the identified model leaves on the fitted records: noise, and what the
+        model lacks. ``width`` is the width of the samples' band alone beside that of ±20 % on every parameter.
+        """
+        from statistics import NormalDist
+
+        from ._records import as_experiment
+
+        if not 0 < level < 1:
+            raise unusable(f"level is a share between 0 and 1, not {level}")
+        raw = _excite.series(as_experiment(experiment)._native)
+        factor, joints = NormalDist().inv_cdf(0.5 + 0.5 * level), self.robot.joints
+        rng = np.random.default_rng(0)
+        twenty = self.best * rng.uniform(0.8, 1.2, self.values.shape)
+        parts: Dict[bool, List[Tuple[Array, Array, Array]]] = {False: [], True: []}
+        for r in raw["records"]:
+            q, dq, ddq, tau = (from_columns(r[k], len(joints)) for k in ("q", "dq", "ddq", "tau"))
+            good = np.flatnonzero(np.array(r["measured"]))
+            # of a long record every so many, which is as good
+            good = good[:: max(len(good) // 4000, 1)]
+            y = self.robot.regressor(q[good], dq[good], ddq[good])
+            known = self.robot.torque(q[good], dq[good], ddq[good], 0.0 * self.best)
+            left = tau[good] - y @ self.best - known
+            wide, usual = (np.einsum("sjp,np->nsj", y, v - v.mean(0), optimize=True).std(0) for v in (self.values, twenty))
+            parts[bool(r["holdout"])].append((left, wide, usual))
+        if not parts[True] or not parts[False]:
+            raise unusable("coverage needs records to fit and records held out")
+        noise = np.sqrt(np.mean(np.concatenate([p[0] for p in parts[False]]) ** 2, axis=0))
+        left, wide, usual = (np.concatenate(x) for x in zip(*parts[True]))
+        inside = np.abs(left) <= factor * np.sqrt(wide**2 + noise**2)
+        return {
+            "level": level,
+            "covered": float(inside.mean()),
+            "joints": [
+                {"joint": j, "covered": float(c), "noise": float(n), "width": float(w)}
+                for j, c, n, w in zip(joints, inside.mean(0), noise, wide.mean(0) / np.maximum(usual.mean(0), 1e-300))
+            ],
+            "width": float(np.mean(wide / noise) / max(np.mean(usual / noise), 1e-300)),
+        }
+
+    def __repr__(self) -> str:
+        return f"<excite.Posterior of {self.robot.name}: {len(self)} samples of {len(self.names)} parameters>"
+
+
+def sample(model: "Identification", n: int, seed: int) -> Posterior:
+    """Samples of an identification."""
+    robot = model.robot
+    listed = model.model["parameters"]
+    names, best = [p["name"] for p in listed], model.values
+    if [p.name for p in robot.parameters] != names or robot.closed:
+        raise unusable("samples are for serial robots and trees whose robot file could be written")
+    base = robot.base()
+    t = np.zeros((len(base.kept), len(best)))
+    t[np.arange(len(base.kept)), base.kept] = 1.0
+    t[:, base.dropped] = base.k
+    strength = float(model.to_dict()["prior"]["strength"])
+    if not strength > 0:
+        raise unusable("the identification has no prior (consistency=\"free\"): what the data do not see has no bounds")
+    coordinates, jacobian = _coordinates(names, best)
+    seen = t @ jacobian
+    # whitened, by eigenvalues: what is known exactly needs no inverse
+    values, vectors = np.linalg.eigh(0.5 * (model.base_covariance + model.base_covariance.T))
+    floor = 1e-14 * values.max()
+    white = (vectors / np.sqrt(np.maximum(values, floor))).T @ seen
+    precision = white.T @ white + strength * np.eye(jacobian.shape[1])
+    rng = np.random.default_rng(seed)
+    steps = np.linalg.solve(np.linalg.cholesky(precision).T, rng.standard_normal((jacobian.shape[1], n))).T
+    rows = np.array([_moved(best, coordinates, s) for s in steps]).reshape(n, len(best))
+    return Posterior(robot, names, [p["unit"] for p in listed], rows, best)
+
+
+#: One group of coordinates: parameters that it moves, and the factor of a pseudo-inertia or nothing for single numbers.
+_Group = Tuple[List[int], Optional[Array], str]
+
+
+def _coordinates(names: List[str], best: Array) -> "Tuple[List[_Group], Array]":
+    """Coordinates in which everything can exist, and the derivatives of the parameters with respect to them."""
+    groups: List[_Group] = []
+    columns: List[Array] = []
+    units = _units()
+    k = 0
+    while k < len(names):
+        link, _, what = names[k].rpartition(".")
+        body = what == "m" and k + 10 <= len(names) and all(n.startswith(link + ".") for n in names[k : k + 10])
+        if body:
+            at = list(range(k, k + 10))
+            j = pseudo(best[k : k + 10])
+            values, vectors = np.linalg.eigh(j)
+            root = vectors * np.sqrt(np.maximum(values, 1e-15 * values.max()))
+            groups.append((at, root, "body"))
+            for u in units:
+                column = np.zeros(len(best))
+                column[at] = ten_of(root @ u @ root.T)
+                columns.append(column)
+            k += 10
+            continue
+        column = np.zeros(len(best))
+        positive = what != "offset" and best[k] > 0
+        column[k] = best[k] if positive else 1.0 + abs(best[k])
+        groups.append(([k], None, "positive" if positive else "any"))
+        columns.append(column)
+        k += 1
+    return groups, np.array(columns).T
+
+
+def _moved(best: Array, groups: "List[_Group]", step: Array) -> Array:
+    """The parameters at a place in the coordinates."""
+    out: Array = best.copy()
+    at, units = 0, _units()
+    for where, root, kind in groups:
+        if root is not None:
+            s = np.tensordot(step[at : at + 10], units, axes=1)
+            values, vectors = np.linalg.eigh(s)
+            out[where] = ten_of(root @ (vectors * np.exp(values)) @ vectors.T @ root.T)
+            at += 10
+            continue
+        x = best[where[0]]
+        out[where[0]] = x * np.exp(step[at]) if kind == "positive" else x + (1.0 + abs(x)) * step[at]
+        at += 1
+    return out

@@ -1,0 +1,573 @@
+"""The functions: the commands of the program, with its options as keyword arguments."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+from . import _excite
+from ._arrays import vector
+from ._errors import Interrupted, emit, unusable
+from ._progress import Bar, Progress
+from ._records import Experiment, as_experiment
+from ._results import (
+    CONTROLLERS,
+    Assessment,
+    Calibration,
+    Design,
+    Diagnosis,
+    Export,
+    Identification,
+    Load,
+    Simulation,
+)
+from ._robot import PathLike, Robot, _names
+from ._trajectory import Motion, Trajectory, as_trajectory
+
+RobotLike = Union[Robot, PathLike]
+TrajectoryLike = Union[Trajectory, Design, PathLike, Dict[str, Any]]
+ExperimentLike = Union[Experiment, PathLike]
+#: A value of all joints, or of some by their names.
+PerJoint = Union[None, float, Sequence[float], Mapping[str, Union[float, Sequence[float]]]]
+
+
+def robots() -> Dict[str, str]:
+    """Names of the bundled robots, and what they are."""
+    return dict(_excite.robots())
+
+
+def formats() -> Dict[str, str]:
+    """Formats of controllers that :func:`export` writes, and what they are."""
+    return dict(_excite.formats())
+
+
+def _robot(value: RobotLike) -> Robot:
+    if isinstance(value, Robot):
+        return value
+    if isinstance(value, (str, os.PathLike)):
+        return Robot.load(value)
+    raise unusable(f"a robot is an excite.Robot, a path or a bundled name, not {type(value).__name__}")
+
+
+def _integer(name: str, value: Any, least: int = 0) -> int:
+    try:
+        number = int(value)
+        if number != value or number < least or number >= 2**32:
+            raise ValueError
+        return number
+    except (TypeError, ValueError):
+        raise unusable(f"{name} must be a whole number of at least {least}, not {value!r}") from None
+
+
+def _optional(name: str, value: Any, least: int = 0) -> Optional[int]:
+    return None if value is None else _integer(name, value, least)
+
+
+def _real(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise unusable(f"{name} must be a number, not {value!r}") from None
+
+
+def _real_or_none(name: str, value: Any) -> Optional[float]:
+    return None if value is None else _real(name, value)
+
+
+def design(
+    robot: RobotLike,
+    *,
+    harmonics: int = 5,
+    period: float = 10.0,
+    periods: Optional[int] = None,
+    grid: str = "full",
+    diagnostic: bool = False,
+    ends: str = "rest",
+    coordinates: Optional[str] = None,
+    start: Any = None,
+    criterion: str = "known",
+    condition: Optional[str] = None,
+    derate: float = 0.9,
+    rate: float = 1000.0,
+    seed: int = 1,
+    starts: Optional[int] = None,
+    time_limit: Optional[float] = None,
+    threads: int = 0,
+    identify: Optional[Sequence[str]] = None,
+    collision: bool = True,
+    meshes: Sequence[PathLike] = (),
+    progress: Progress = None,
+) -> Design:
+    """Design an exciting trajectory, inside all limits for all time (``excite design``).
+
+    The same seed gives the same trajectory as the program and on any number of threads, unless a time limit ends the
+    run. Ctrl-C ends it early: :class:`Interrupted` (a ``KeyboardInterrupt``) has the best design so far in ``best``.
+
+    Args:
+        robot: an :class:`excite.Robot`, a path, or a bundled name.
+        harmonics: of the Fourier series of each joint.
+        period: s.
+        periods: of the experiment; 1, or 3 with ``diagnostic``.
+        grid: harmonics used: ``"full"``, ``"odd"``, ``"random-odd"``.
+        diagnostic: also make the motions that :func:`diagnose` wants, in ``motions``; all of odd harmonics.
+        ends: ``"rest"`` (zero velocity and acceleration) or ``"free"``.
+        coordinates: what moves of a parallel robot: ``"platform"`` or ``"actuators"``.
+        start: posture at the start, rad or m, ``(coordinates,)``; free where left out.
+        criterion: ``"known"`` (as many parameters as can be known to 10 %), ``"condition"``, ``"d"``, ``"a"``, ``"e"``.
+        condition: matrix that the other criteria judge: ``"invariant"``, ``"raw"``, ``"normalised"``, ``"weighted"``.
+        derate: fraction of every limit that may be used.
+        rate: of ``samples.csv``, Hz.
+        seed: of the random starts.
+        starts: most starts; 12 where neither this nor a time limit is given.
+        time_limit: wall clock of the optimisation, s.
+        threads: 0 for one a core.
+        identify: joint columns, for all joints: of armature, viscous, coulomb, offset; ``()`` for none; as in the robot
+            file where left out.
+        collision: whether the robot must keep clear of itself and of what stands around.
+        meshes: folders in which ``package://`` meshes are looked for first.
+        progress: a bar of tqdm where somebody looks (``None``), always, never, or a function ``(done, of, words)``.
+    """
+    own = _robot(robot)
+    if identify is not None:
+        own = own.with_terms(_names("identify", identify))
+    if coordinates is not None:
+        own = own.in_space(coordinates)
+    if not collision:
+        own = own.without_collisions()
+    elif meshes:
+        own = own.with_meshes(meshes)
+    if diagnostic and grid != "full":
+        raise unusable("diagnostic chooses odd harmonics: grid cannot be stated with it")
+    with Bar(progress, "design") as bar:
+        report, text, motions, experiment, signal = _excite.design(
+            own._plant,
+            harmonics=_integer("harmonics", harmonics),
+            period=_real("period", period),
+            periods_=_optional("periods", periods),
+            grid=grid,
+            diagnostic=bool(diagnostic),
+            ends=ends,
+            start=None if start is None else vector("start", start).tolist(),
+            criterion=criterion,
+            condition=condition,
+            derate=_real("derate", derate),
+            rate=_real("rate", rate),
+            seed=_integer("seed", seed),
+            starts=_optional("starts", starts),
+            time_limit=_real_or_none("time_limit", time_limit),
+            threads=_integer("threads", threads),
+            spec=own._named(),
+            progress=bar.report,
+        )
+    further = [
+        Motion(name, "holdout" if holdout else "fit", about, Trajectory(json))
+        for name, holdout, about, json in motions
+    ]
+    result = Design(report, own, Trajectory(text), further, experiment, float(rate))
+    if signal is not None:
+        if isinstance(signal, KeyboardInterrupt):
+            raise Interrupted(result) from None
+        signal.best = result  # type: ignore[attr-defined]
+        raise signal
+    emit(result.warnings)
+    return result
+
+
+def assess(
+    robot: RobotLike,
+    trajectory: Optional[TrajectoryLike] = None,
+    *,
+    identify: Optional[Sequence[str]] = None,
+    collision: bool = True,
+    meshes: Sequence[PathLike] = (),
+) -> Assessment:
+    """What a robot can tell, and with a trajectory how well, and whether all limits hold for all time
+    (``excite identifiability``). Arguments as for :func:`design`."""
+    own = _robot(robot)
+    if identify is not None:
+        own = own.with_terms(_names("identify", identify))
+    if not collision:
+        own = own.without_collisions()
+    elif meshes:
+        own = own.with_meshes(meshes)
+    text = None if trajectory is None else as_trajectory(trajectory).to_json()
+    result = Assessment(_excite.assess(own._plant, text))
+    emit(result.warnings)
+    return result
+
+
+def _effect(name: str, value: Any) -> List[str]:
+    """An effect as the program states it: ``[JOINT=]NUMBERS``."""
+    if value is None:
+        return []
+    if isinstance(value, Mapping):
+        return [f"{joint}={_numbers(name, v)}" for joint, v in value.items()]
+    return [_numbers(name, value)]
+
+
+def _numbers(name: str, value: Any) -> str:
+    listed = vector(name, [value] if _scalar(value) else value)
+    return ",".join(repr(float(x)) for x in listed)
+
+
+def _scalar(value: Any) -> bool:
+    try:
+        float(value)
+        return True
+    except (TypeError, ValueError):
+        return False
+
+
+def simulate(
+    robot: RobotLike,
+    trajectory: TrajectoryLike,
+    *,
+    periods: Optional[int] = None,
+    lead_in: int = 1,
+    rate: float = 1000.0,
+    step: float = 2.5e-4,
+    controller: str = "feedforward",
+    bandwidth: float = 10.0,
+    damping: float = 1.0,
+    noise: float = 1.0,
+    seed: int = 0,
+    derivatives: bool = False,
+    pose: bool = False,
+    payload: Any = None,
+    stribeck_friction: PerJoint = None,
+    nonlinear_viscous_friction: PerJoint = None,
+    friction_asymmetry: PerJoint = None,
+    load_dependent_friction: PerJoint = None,
+    torque_constant: PerJoint = None,
+    joint_offset: PerJoint = None,
+    torque_delay: float = 0.0,
+    gravity_direction: Optional[Tuple[float, float]] = None,
+    perturb: float = 0.0,
+    monte_carlo: Optional[int] = None,
+    progress: Progress = None,
+) -> Simulation:
+    """Rehearse an experiment: the robot under a controller, and the log that it would write (``excite simulate``).
+
+    An effect is a number for all joints, or a dictionary by joint: ``joint_offset={"j3": 0.01}``.
+
+    Args:
+        robot, trajectory: what moves, and how.
+        periods: to log; as in the trajectory where left out.
+        lead_in: periods before the log begins.
+        rate: samples a second, Hz.
+        step: largest step of the integrator, s.
+        controller: ``"feedforward"`` or ``"pd"``.
+        bandwidth: natural frequency of the tracking error, Hz.
+        damping: its damping ratio.
+        noise: factor on the torque noise of the robot file; 0: ideal sensors.
+        seed: of everything random.
+        derivatives: whether the record has true velocities and accelerations.
+        pose: whether it has the true pose of the platform (parallel robots).
+        payload: load on the last body or platform: mass (kg), centre (m), and tensor about it (xx, xy, xz, yy, yz, zz,
+            kg m²): 4 or 10 numbers.
+        stribeck_friction: force beyond Coulomb friction (N m or N) and velocity at which it has fallen to 1/e.
+        nonlinear_viscous_friction: ``C`` of ``C v |v|``.
+        friction_asymmetry: difference of the Coulomb friction between the directions, N m or N.
+        load_dependent_friction: ``beta`` of ``beta |torque| sign(v)``.
+        torque_constant: factor on the measured torque.
+        joint_offset: added to the measured position, rad or m.
+        torque_delay: of the measured torque, s.
+        gravity_direction: rotation of the base about its x and y axes that the model does not know, rad.
+        perturb: random deviation of all bodies and joint terms from the model, up to this fraction.
+        monte_carlo: rehearse so many times and compare predicted with achieved spread.
+        progress: as for :func:`design`.
+    """
+    own, motion = _robot(robot), as_trajectory(trajectory)
+    effects = {
+        "payload": None if payload is None else _numbers("payload", payload),
+        "stribeck_friction": _effect("stribeck_friction", stribeck_friction),
+        "nonlinear_viscous_friction": _effect("nonlinear_viscous_friction", nonlinear_viscous_friction),
+        "friction_asymmetry": _effect("friction_asymmetry", friction_asymmetry),
+        "load_dependent_friction": _effect("load_dependent_friction", load_dependent_friction),
+        "torque_constant": _effect("torque_constant", torque_constant),
+        "joint_offset": _effect("joint_offset", joint_offset),
+        "torque_delay": _real("torque_delay", torque_delay),
+        "gravity_direction": None,
+        "perturb": _real("perturb", perturb),
+    }
+    if gravity_direction is not None:
+        effects["gravity_direction"] = vector("gravity_direction", gravity_direction, 2).tolist()
+    with Bar(progress, "simulate") as bar:
+        raw = _excite.simulate(
+            own._plant,
+            motion.to_json(),
+            periods=_optional("periods", periods),
+            lead_in=_integer("lead_in", lead_in),
+            rate=_real("rate", rate),
+            step=_real("step", step),
+            controller=controller,
+            bandwidth=_real("bandwidth", bandwidth),
+            damping=_real("damping", damping),
+            noise=_real("noise", noise),
+            seed=_integer("seed", seed),
+            effects=effects,
+            pose=bool(pose),
+            monte_carlo_=_optional("monte_carlo", monte_carlo, 1),
+            progress=bar.report,
+        )
+    carried = None if payload is None else "unknown"
+    result = Simulation(raw, own.name, own.joints, bool(derivatives), carried)
+    emit(result.warnings)
+    return result
+
+
+def identify(
+    experiment: ExperimentLike,
+    *,
+    method: str = "wls",
+    consistency: str = "entropic",
+    prior: Optional[float] = None,
+    cutoff: Optional[float] = None,
+    position_cutoff: Optional[float] = None,
+    average: bool = True,
+    derive: bool = False,
+    identify: Optional[Sequence[str]] = None,
+) -> Identification:
+    """Identify the model from recorded runs (``excite identify``).
+
+    Args:
+        experiment: an :class:`excite.Experiment`, or the path of an ``experiment.toml``.
+        method: ``"ols"``, ``"wls"``, ``"robust"``, ``"ml"`` (maximum likelihood from the scatter of periods), ``"iv"``.
+        consistency: ``"entropic"``, ``"lmi"``, or ``"free"`` for none.
+        prior: strength of the prior: 4 for nominal values good to 50 %, 100 for 10 %; by cross-validation where left out.
+        cutoff: of the filter that torque and regressor pass, Hz.
+        position_cutoff: of the positions, Hz.
+        average: whether periods of a motion that repeats are averaged.
+        derive: derive velocities and accelerations from positions even where they were measured.
+        identify: joint columns, for all joints: of armature, viscous, coulomb, offset; ``()`` for none; as in the robot
+            file where left out.
+    """
+    core = as_experiment(experiment)._native
+    result = Identification(
+        _excite.identify(
+            core,
+            method=method,
+            consistency=consistency,
+            prior=_real_or_none("prior", prior),
+            cutoff=_real_or_none("cutoff", cutoff),
+            position_cutoff=_real_or_none("position_cutoff", position_cutoff),
+            average=bool(average),
+            derive=bool(derive),
+            identify=None if identify is None else _names("identify", identify),
+        )
+    )
+    emit(result.warnings)
+    return result
+
+
+def load(
+    experiment: ExperimentLike,
+    *,
+    parameters: str = "full",
+    method: str = "one-step",
+    unweighted: bool = False,
+    unconstrained: bool = False,
+    standstill: Optional[float] = None,
+    atmosphere: float = 101_325.0,
+    position_cutoff: Optional[float] = None,
+    cutoff: Optional[float] = None,
+    controllers: Sequence[str] = (),
+    flange: Any = None,
+) -> Load:
+    """Identify the load that a robot carries (``excite load``).
+
+    Records with ``payload="unknown"`` carry it; records with ``"none"`` are of the empty robot; records with a known
+    payload identify the gains of the drives first.
+
+    Args:
+        parameters: ``"full"`` or ``"mass-com"``.
+        method: ``"one-step"``, or ``"two-step"`` for platforms.
+        unweighted: do not take weight from samples near standstill.
+        unconstrained: give the estimate as it is, even if no rigid body could have it.
+        standstill: mean speed at which samples begin to count in the two steps, rad/s or m/s.
+        atmosphere: pressure outside of the cylinders, Pa.
+        position_cutoff, cutoff: of the filters, Hz; ``inf`` for none.
+        controllers: also save the load for ``"franka"``, ``"ur"``, ``"kuka"``.
+        flange: where the flange is in the frame of the body that carries the load: x, y, z (m), roll, pitch, yaw (rad).
+    """
+    core = as_experiment(experiment)._native
+    wanted = _names("controllers", controllers)
+    for name in wanted:
+        if name not in CONTROLLERS:
+            raise unusable(f"controllers are {', '.join(CONTROLLERS)}, not `{name}`")
+    positive = {"standstill": standstill, "position_cutoff": position_cutoff, "cutoff": cutoff}
+    for what, value in positive.items():
+        if value is not None and not _real(what, value) > 0:
+            raise unusable(f"{what} must be positive, not {value}")
+    pressure = _real("atmosphere", atmosphere)
+    if not 0 <= pressure < float("inf"):
+        raise unusable(f"atmosphere is a pressure in Pa, not {atmosphere}")
+    result = Load(
+        _excite.load(
+            core,
+            parameters=parameters,
+            method=str(method).replace("-", "_"),
+            weighted=not unweighted,
+            consistent=not unconstrained,
+            standstill=_real_or_none("standstill", standstill),
+            atmosphere=pressure,
+            position_cutoff=_real_or_none("position_cutoff", position_cutoff),
+            cutoff=_real_or_none("cutoff", cutoff),
+            flange=[0.0] * 6 if flange is None else vector("flange", flange, 6).tolist(),
+        ),
+        wanted,
+    )
+    emit(result.warnings)
+    return result
+
+
+def diagnose(
+    experiment: ExperimentLike,
+    *,
+    next: bool = True,
+    next_tries: int = 64,
+    seed: int = 1,
+    progress: Progress = None,
+) -> Diagnosis:
+    """Diagnose the gap between a model and its robot: where it lies, which effect causes it, how far it shrinks, what to
+    run next (``excite diagnose``).
+
+    Args:
+        next: whether the next motion is designed.
+        next_tries: random steps by which the best design of it is improved.
+        seed: of its random starts.
+        progress: as for :func:`design`.
+    """
+    core = as_experiment(experiment)._native
+    with Bar(progress, "diagnose") as bar:
+        report = _excite.diagnose(
+            core,
+            next=bool(next),
+            next_tries=_integer("next_tries", next_tries),
+            seed=_integer("seed", seed),
+            progress=bar.report,
+        )
+    result = Diagnosis(report)
+    emit(result.warnings)
+    return result
+
+
+def calibrate(
+    calibration: Union[PathLike, None] = None,
+    *,
+    robot: Optional[RobotLike] = None,
+    measurements: Sequence[Mapping[str, Any]] = (),
+    distances: Sequence[Mapping[str, Any]] = (),
+    frame: Optional[str] = None,
+    gravity: Optional[str] = None,
+    effects: Optional[Sequence[str]] = None,
+    tolerances: Optional[Mapping[str, float]] = None,
+    algorithm: str = "inverse",
+    orientation: bool = True,
+) -> Calibration:
+    """Identify the geometry of a robot from what was seen or touched (``excite calibrate``).
+
+    Args:
+        calibration: path of a ``calibration.toml``; or, instead of it, what such a file holds:
+        robot: the robot.
+        measurements: one dictionary a placement: ``kind`` (``"pose"``, ``"position"``, ``"point"``, ``"plane"``,
+            ``"gauge"``), ``q`` (readings, rad or m, ``(rows, joints)``), ``values`` (pose ``x y z qw qx qy qz``, position
+            ``x y z``, m, or ``reading``, m; ``(rows, columns)``; none for points and planes), and if wanted ``use``,
+            ``group``, ``std`` (m), ``angle_std`` (rad), ``instrument``, ``cov`` (``(rows, 6, 6)`` of poses).
+        distances: ``{"between": (0, 1), "value": m, "std": m}`` between the points of two measurements, by their place.
+        frame: name of the frame that the measurement sees.
+        gravity: robot whose inertia tells the torques of gravity.
+        effects: of ``"joint_compliance"``, ``"encoder_eccentricity"``, ``"backlash"``; those that the data bear out where
+            left out.
+        tolerances: ``length``, ``pose_length`` (m), ``angle``, ``pose_angle`` (rad): what is known beforehand.
+        algorithm: of parallel robots: ``"inverse"``, ``"implicit"``, ``"forward"``.
+        orientation: whether the measured orientation of a parallel robot is kept to one that it can take.
+    """
+    if calibration is not None:
+        if robot is not None or measurements:
+            raise unusable("give the path of a calibration.toml, or robot and measurements, not both")
+        report = _excite.calibrate(Path(os.fspath(calibration)), algorithm=algorithm, orientation=bool(orientation))
+    else:
+        if robot is None or not measurements:
+            raise unusable("a calibration needs the path of a calibration.toml, or robot and measurements")
+        from ._calibration import write
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = write(
+                Path(folder), _robot(robot), measurements, distances, frame, gravity, effects, tolerances
+            )
+            try:
+                report = _excite.calibrate(path, algorithm=algorithm, orientation=bool(orientation))
+            except _excite.Error as e:
+                error = _excite.Error(str(e).replace(folder + os.sep, ""))
+                error.kind = e.kind
+                raise error from None
+    result = Calibration(report)
+    emit(result.warnings)
+    return result
+
+
+def export(
+    trajectory: TrajectoryLike,
+    format: str,
+    *,
+    robot: Optional[RobotLike] = None,
+    rate: Optional[float] = None,
+    periods: Optional[int] = None,
+    speed: float = 1.0,
+    approach: Optional[PathLike] = None,
+    retreat: Optional[PathLike] = None,
+    joints: Optional[Sequence[str]] = None,
+    columns: Optional[Sequence[str]] = None,
+    unit: Sequence[str] = (),
+    move_to_start: bool = False,
+) -> Export:
+    """A trajectory as the file that a controller reads (``excite export``).
+
+    Args:
+        format: one of :func:`formats`.
+        robot: needed for the motion of a platform and for ``unit``.
+        rate: samples a second, Hz; chosen so that the deviation between them is small enough where left out.
+        periods: as in the trajectory where left out.
+        speed: fraction of the speed of the design.
+        approach, retreat: files of moves to the start and back, with the columns ``t, q1 …, dq1 …, ddq1 …``.
+        joints: by name, in the order of the controller.
+        columns: of ``csv`` (t, q, dq, ddq), or what points of ``ros2`` have.
+        unit: of ``csv``: rad or deg, m or mm.
+        move_to_start: begin the program with a slow move to the start (urscript, xarm); nobody looks for obstacles.
+    """
+    motion = as_trajectory(trajectory)
+    own = None if robot is None else _robot(robot)._plant
+    raw = _excite.export(
+        motion.to_json(),
+        format,
+        own,
+        rate=_real_or_none("rate", rate),
+        periods=_optional("periods", periods),
+        speed=_real("speed", speed),
+        approach=None if approach is None else Path(os.fspath(approach)),
+        retreat=None if retreat is None else Path(os.fspath(retreat)),
+        joints=None if joints is None else _names("joints", joints),
+        columns=None if columns is None else _names("columns", columns),
+        units=_names("unit", unit),
+        move_to_start=bool(move_to_start),
+    )
+    result = Export(raw)
+    emit(result.warnings)
+    return result
+
+
+__all__ = [
+    "assess",
+    "calibrate",
+    "design",
+    "diagnose",
+    "export",
+    "formats",
+    "identify",
+    "load",
+    "robots",
+    "simulate",
+]
