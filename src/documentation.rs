@@ -49,6 +49,7 @@ macro_rules! documents {
             #[doc = "[results.md]: crate::documentation::results"]
             #[doc = "[run.md]: crate::documentation::run"]
             #[doc = "[simulation.md]: crate::documentation::simulation"]
+            #[doc = "[simulators.md]: crate::documentation::simulators"]
             #[doc = "[withheld.md]: crate::documentation::withheld"]
             #[doc = ""]
             #[doc = include_str!(concat!("../docs/", $file, ".md"))]
@@ -79,5 +80,6 @@ documents! {
     results "results"
     run "run"
     simulation "simulation"
+    simulators "simulators"
     withheld "withheld"
 }

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
     long_about = "Diagnose the gap between a model and its robot: where it lies, which effect causes it, how far it shrinks \
                   once that effect is added, and what to run next.\n\nReads experiment.toml (robot, logs, which are fitted and \
                   which only predicted). Writes diagnosis.json and report.html; robot.toml, robot.urdf and robot.xml (MuJoCo) \
-                  with the improved model; next.json, the motion that tells rivals apart or shows what these records cannot, of the joints or of the platform.",
+                  with the improved model, and effects.py where MuJoCo has no element for an effect; next.json, the motion that tells rivals apart or shows what these records cannot, of the joints or of the platform.",
     after_help = "Examples:\n  excite diagnose experiment.toml\n  excite diagnose experiment.toml --output gap --json\n  excite \
                   diagnose experiment.toml --no-next"
 )]
@@ -127,6 +127,13 @@ pub fn run(args: Args) -> Result<()> {
         if !f.same.is_empty() {
             let _ = writeln!(out, "  not told from {}", f.same.join(", "));
         }
+    }
+    let held = d.improved.remarks.iter().zip(&d.improved.in_mujoco);
+    let changed: Vec<String> = held
+        .map(|(r, files)| format!("  {} ({}): {files}", r.effect, r.place))
+        .collect();
+    if !changed.is_empty() {
+        let _ = writeln!(out, "\nin MuJoCo\n{}", changed.join("\n"));
     }
     if let Some(n) = &d.next {
         let _ = writeln!(

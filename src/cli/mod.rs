@@ -211,6 +211,12 @@ impl Folder {
     /// The robot files of a model: those that can be written, with warnings about the others.
     fn robot(&self, texts: Vec<(&'static str, Result<String>)>) -> Result<Vec<PathBuf>> {
         let mut written = Vec::new();
+        // what this model needs no more
+        for name in excite::export::all() {
+            if !texts.iter().any(|(n, _)| *n == name) {
+                self.remove(name)?;
+            }
+        }
         for (name, text) in texts {
             match text {
                 Ok(text) => written.push(self.write(name, &text)?),

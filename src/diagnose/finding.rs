@@ -1,11 +1,12 @@
 //! Effects in the result: members of the set that was fitted, and what could stand in their place.
 
 use super::carried::Carried;
-use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value};
+use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value, in_mujoco};
 use super::evidence::{Evidence, Projected};
 use super::interval;
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::Decision;
+use crate::export::Form;
 
 /// One effect in the result.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -48,6 +49,8 @@ pub struct Finding {
     pub values: Vec<Value>,
     /// effects that this data cannot tell from it
     pub same: Vec<&'static str>,
+    /// how the files for MuJoCo hold it
+    pub mujoco: Form,
     /// whether it is part of the set that was fitted, or only a rival
     pub member: bool,
     /// whether it shows against the prior of the parameters, not in a refitted residual
@@ -141,6 +144,7 @@ fn members(
             decoys: m.decoys,
             unsteady: m.unsteady,
             values: effect.values(cx, &estimate(c.place, &c.shape, &c.eta, &m.std)),
+            mujoco: in_mujoco(cx, effect, &estimate(c.place, &c.shape, &c.eta, &m.std)),
             same,
             member: true,
             frozen: m.frozen,
@@ -169,6 +173,7 @@ fn rivals(
                 continue;
             }
             seen.push(r.effect);
+            let of_rival = estimate(r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]);
             let main = &findings[m];
             findings.push(Finding {
                 effect: card.name,
@@ -187,10 +192,8 @@ fn rivals(
                 visibility: of.visibility,
                 decoys: None,
                 unsteady: None,
-                values: effect.values(
-                    cx,
-                    &estimate(r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]),
-                ),
+                values: effect.values(cx, &of_rival),
+                mujoco: in_mujoco(cx, effect, &of_rival),
                 same: if r.weight > T.rivals.same {
                     vec![main.effect]
                 } else {
@@ -221,7 +224,8 @@ pub fn carried(
     let std: Vec<f64> = (at..at + 10).map(|i| scale * evidence.std(i)).collect();
     // a load without weight is none
     let shape = effect.shapes(cx, &place).pop()?;
-    let values = effect.values(cx, &estimate(place, &shape, &eta, &std));
+    let load_of = estimate(place, &shape, &eta, &std);
+    let values = effect.values(cx, &load_of);
     let mut of: Vec<(usize, String)> = data
         .records
         .iter()
@@ -247,6 +251,7 @@ pub fn carried(
         decoys: Some(load.decoys),
         unsteady: Some(load.unsteady),
         values,
+        mujoco: in_mujoco(cx, effect.as_ref(), &load_of),
         same: Vec::new(),
         member: true,
         frozen: true,

@@ -16,7 +16,7 @@ use super::evidence::Evidence;
 use super::finding::Finding;
 use super::thresholds::THRESHOLDS as T;
 use crate::error::{Warning, WarningKind};
-use crate::export::{self, FORMATS, Format, Remark};
+use crate::export::{self, Remark};
 use crate::identify::consistent::{self, Prior};
 use crate::plant::Plant;
 use crate::robot::Robot;
@@ -30,6 +30,10 @@ pub struct Improved {
     pub robot: Robot,
     /// the effects found
     pub remarks: Vec<Remark>,
+    /// where MuJoCo's files hold each of them, and how
+    pub in_mujoco: Vec<String>,
+    /// names of the robot files that hold it
+    pub files: Vec<&'static str>,
 }
 
 /// The robot with the parameters `phi`, and of the findings what was claimed.
@@ -53,7 +57,6 @@ pub fn improve(
             eta: f.eta.clone(),
             std: vec![0.0; f.eta.len()],
         };
-        let note = |to: &&dyn Format| Some((to.name(), effect.note(cx, &estimate, to.name())?));
         remarks.push(Remark {
             effect: f.effect,
             place: match f.joints.is_empty() {
@@ -70,11 +73,22 @@ pub fn improve(
                 })
                 .collect(),
             held: effect.apply(cx, &estimate, &mut robot),
-            notes: FORMATS.iter().filter_map(note).collect(),
+            element: effect.element(cx, &estimate),
         });
     }
     let warnings = able(plant, evidence, &mut robot);
-    (Improved { robot, remarks }, warnings)
+    let files = export::needed(&export::Model {
+        plant,
+        robot: &robot,
+        remarks: &remarks,
+    });
+    let improved = Improved {
+        in_mujoco: remarks.iter().map(|r| r.in_files(plant)).collect(),
+        robot,
+        remarks,
+        files,
+    };
+    (improved, warnings)
 }
 
 /// Turns the bodies of a robot into such that can exist.

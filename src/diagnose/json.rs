@@ -39,6 +39,7 @@ fn finding(f: &Finding) -> Value {
         "decoys": f.decoys.map(number),
         "unsteady": f.unsteady.map(number),
         "parameters": parameters,
+        "simulator": { "mujoco": f.mujoco },
         "indistinguishable_from": f.same,
         "in_the_set": f.member,
         "seen_in": if f.frozen { "frozen" } else { "refit" },
@@ -187,6 +188,10 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         "prior_closeness": numbers(&d.closeness),
         "torque_window": number(d.window),
         "thresholds": THRESHOLDS,
+        "files": d.improved.files,
+        "changed": d.improved.remarks.iter().zip(&d.improved.in_mujoco).map(|(r, files)| json!({
+            "effect": r.effect, "place": r.place, "mujoco": files,
+        })).collect::<Vec<_>>(),
         "warnings": d.warnings,
         "seconds": number(seconds),
     });

@@ -4,6 +4,7 @@ mod effects;
 mod next;
 mod residuals;
 mod simulated;
+mod simulators;
 mod summary;
 
 use super::finding::Finding;
@@ -118,6 +119,7 @@ pub fn html(d: &Diagnosis) -> String {
         Section::new("Over frequency", residuals::spectra(d)),
         Section::new("How far it shrinks", effects::shrink(d)),
         Section::new("As the simulator's user sees it", simulated::simulated(d)),
+        Section::new("In your simulator", simulators::simulators(d)),
         Section::new("What to run next", next::next(d)),
         Section::new("What this data cannot say", summary::limits(d)),
         joints::order(d.joints.iter().map(String::as_str)),

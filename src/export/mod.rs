@@ -3,13 +3,16 @@
 //! | file | module | holds | robots |
 //! |---|---|---|---|
 //! | `robot.urdf` | [`urdf`] | tree, inertia, limits, viscous and Coulomb friction | all |
-//! | `robot.xml` | `mujoco` | the same for MuJoCo, rotor inertia, gravity | serial |
+//! | `robot.xml` | `mujoco` | the same for MuJoCo, rotor inertia, gravity, springs, drives | serial |
+//! | `effects.py` | `effects` | what MuJoCo has no element for, as functions of state and time step | serial |
 //! | `robot.toml` | `robot_toml`, [`mechanism`] | what the other commands read, geometry and loops included | all |
 //!
 //! A new format is one file with an implementation of [`Format`], and one line in [`FORMATS`]. What a model
 //! has and a format cannot hold stands in it as a comment ([`Remark`]). The bodies that are written can
 //! exist: masses are positive and principal moments fulfil the triangle inequality ([`possible`]).
 
+pub(crate) mod effects;
+pub(crate) mod element;
 #[doc(hidden)]
 pub mod mechanism;
 pub(crate) mod mujoco;
@@ -18,6 +21,8 @@ pub(crate) mod robot_toml;
 #[doc(hidden)]
 pub mod urdf;
 
+#[doc(hidden)]
+pub use element::{Element, Form};
 #[doc(hidden)]
 pub use remark::Remark;
 
@@ -50,6 +55,21 @@ pub enum Part {
     Frames,
 }
 
+impl Part {
+    /// What MuJoCo's file says of it.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Part::Bodies => "inertial of the bodies",
+            Part::Term(JointTerm::Armature) => "armature",
+            Part::Term(JointTerm::Viscous) => "damping",
+            Part::Term(JointTerm::Coulomb) => "frictionloss",
+            Part::Term(JointTerm::Offset) => "a far spring",
+            Part::Gravity => "gravity",
+            Part::Frames => "pos and quat of the bodies",
+        }
+    }
+}
+
 /// A file format.
 pub trait Format: Sync {
     /// Name, by which effects know it.
@@ -62,6 +82,14 @@ pub trait Format: Sync {
     }
     /// Whether it has this part of a model.
     fn has(&self, part: Part) -> bool;
+    /// How it holds an element.
+    fn element(&self, _element: &Element) -> Form {
+        Form::None
+    }
+    /// Whether a model has anything for it.
+    fn needed(&self, _model: &Model) -> bool {
+        true
+    }
     /// Text of the file.
     ///
     /// # Errors
@@ -71,15 +99,32 @@ pub trait Format: Sync {
 
 /// All formats.
 #[doc(hidden)]
-pub const FORMATS: [&dyn Format; 3] = [&urdf::Urdf, &mujoco::Mujoco, &robot_toml::RobotToml];
+pub const FORMATS: [&dyn Format; 4] = [
+    &urdf::Urdf,
+    &mujoco::Mujoco,
+    &effects::Effects,
+    &robot_toml::RobotToml,
+];
 
-/// Names of the files that a robot of this kind is written to.
+/// Names of the files that a robot of this kind may be written to.
 pub fn files(plant: &Plant) -> Vec<&'static str> {
     let held = FORMATS.iter().filter(|f| f.holds(plant));
     held.map(|f| f.file()).collect()
 }
 
-/// Every file of a model, in the order of [`files`], with its text or why there is none.
+/// Names of all files.
+#[doc(hidden)]
+pub fn all() -> Vec<&'static str> {
+    FORMATS.iter().map(|f| f.file()).collect()
+}
+
+/// Names of the files that a model needs.
+pub fn needed(model: &Model) -> Vec<&'static str> {
+    let held = FORMATS.iter().filter(|f| f.holds(model.plant));
+    held.filter(|f| f.needed(model)).map(|f| f.file()).collect()
+}
+
+/// Every file of a model that it needs, in the order of [`files`], with its text or why there is none.
 ///
 /// ```
 /// use excite::Plant;
@@ -96,7 +141,9 @@ pub fn files(plant: &Plant) -> Vec<&'static str> {
 /// ```
 pub fn write(model: &Model) -> Vec<(&'static str, Result<String>)> {
     let held = FORMATS.iter().filter(|f| f.holds(model.plant));
-    held.map(|f| (f.file(), f.write(model))).collect()
+    held.filter(|f| f.needed(model))
+        .map(|f| (f.file(), f.write(model)))
+        .collect()
 }
 
 impl Model<'_> {

@@ -1,6 +1,11 @@
-//! MuJoCo's XML. Viscous and Coulomb friction and rotor inertia are attributes of the joints, gravity is an
-//! option; torque offsets have no place there.
+//! MuJoCo's XML. Friction, rotor inertia and springs are attributes of the joints, gravity is an option, drives are
+//! actuators; what has no element there is in [`effects`](super::effects).
+//!
+//! Dry friction is a constraint that takes the sign of `q̈ + b q̇`: with the stiffest reference that a step allows,
+//! `b = 1 / timestep`, it is that of `q̇` down to `q̈ / b`. A constant torque is a spring so far away that its force
+//! does not change.
 
+use super::element::{Element, Form, Kind};
 use super::{Format, LEAST, Model, Part, bounded, escape, possible, remark, xml_comment};
 use crate::error::Result;
 use crate::plant::Plant;
@@ -10,6 +15,13 @@ use std::fmt::Write;
 
 /// MuJoCo's XML.
 pub struct Mujoco;
+
+/// Step of the simulation, s.
+const STEP: f64 = 1e-3;
+/// Stiffness of a spring that stands for a constant torque, per its torque, 1/rad or 1/m.
+const FAR: f64 = 1e-6;
+/// Least dry friction of a joint whose level a function sets, N m or N: the constraint is there from above zero on.
+const SOME_FRICTION: f64 = 1e-9;
 
 impl Format for Mujoco {
     fn name(&self) -> &'static str {
@@ -24,14 +36,58 @@ impl Format for Mujoco {
         !plant.closed()
     }
 
-    fn has(&self, part: Part) -> bool {
-        part != Part::Term(JointTerm::Offset)
+    fn has(&self, _part: Part) -> bool {
+        true
+    }
+
+    fn element(&self, element: &Element) -> Form {
+        let native = match element {
+            Element::Drag { .. } | Element::Spring { .. } => true,
+            Element::Gain { .. } | Element::Base { .. } => true,
+            Element::Coupling { coulomb, .. } => *coulomb >= 0.0,
+            // an actuator can act late; what is reported late is no part of the machine
+            Element::Delay { seconds, .. } => *seconds < 0.0,
+            Element::Twist { gap, .. } => *gap == 0.0,
+            Element::Function(_) => false,
+        };
+        if native { Form::Native } else { Form::None }
     }
 
     fn write(&self, model: &Model) -> Result<String> {
-        let comment = xml_comment(&remark::lines(model.remarks, self));
-        Ok(format!("{comment}{}", mujoco(model.robot)))
+        let mut lines = remark::lines(model.remarks, self);
+        let parts = Parts::of(model);
+        lines.extend(parts.versions());
+        lines.extend(parts.left_out(model.robot));
+        Ok(format!(
+            "{}{}",
+            xml_comment(&lines),
+            parts.text(model.robot)
+        ))
     }
+}
+
+/// Name of the joint by which the link of a joint stands behind a spring.
+pub(crate) fn twist_joint(robot: &Robot, joint: usize) -> String {
+    free_name(robot, format!("{}_twist", robot.joints[joint].name))
+}
+
+/// Names of the joints by which a base tilts about x and y.
+pub(crate) fn base_joints(robot: &Robot) -> [String; 2] {
+    ["base_tilt_x", "base_tilt_y"].map(|name| free_name(robot, name.into()))
+}
+
+/// A name that no joint and no body has.
+fn free_name(robot: &Robot, mut name: String) -> String {
+    let taken = |name: &str| {
+        robot
+            .bodies
+            .iter()
+            .any(|b| b.joint_name == name || b.name == name)
+    };
+    while taken(&name) {
+        name.push('_');
+    }
+    name
 }
 
 /// A body that MuJoCo takes: it refuses bodies without mass or with a principal moment of zero, and compares
@@ -49,116 +105,422 @@ fn solid(inertia: &Inertia) -> Inertia {
     }
 }
 
-/// The robot as MuJoCo's XML: damping, friction loss and armature are attributes of the joints.
-fn mujoco(robot: &Robot) -> String {
-    let mut out = String::new();
-    let g = robot.gravity;
-    let _ = writeln!(
-        out,
-        "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  <option gravity=\"{} {} {}\"/>\n  \
-         <worldbody>",
-        escape(&robot.name),
-        g.x,
-        g.y,
-        g.z
-    );
-    for b in (0..robot.bodies.len()).filter(|&b| robot.bodies[b].parent.is_none()) {
-        mujoco_body(robot, b, 2, &mut out);
+/// What stands on a joint.
+#[derive(Debug, Clone, Default)]
+struct OnJoint {
+    armature: f64,
+    /// of `q̇`, `q̇ |q̇|`, `q̇³`
+    damping: [f64; 3],
+    coulomb: f64,
+    /// of `1`, `q`, `q²`, `q³`
+    spring: [f64; 4],
+    /// stiffness, its third power, damping; of a spring that the file states
+    twist: Option<[f64; 3]>,
+    gain: f64,
+    /// s
+    delay: f64,
+}
+
+/// A model in the elements of MuJoCo.
+struct Parts<'a> {
+    joints: Vec<OnJoint>,
+    couplings: Vec<&'a Element>,
+    base: Option<&'a Element>,
+}
+
+impl<'a> Parts<'a> {
+    fn of(model: &Model<'a>) -> Self {
+        let plain = |j: &crate::robot::Joint| OnJoint {
+            armature: j.terms[JointTerm::Armature as usize],
+            damping: [j.terms[JointTerm::Viscous as usize], 0.0, 0.0],
+            coulomb: j.terms[JointTerm::Coulomb as usize],
+            spring: [j.terms[JointTerm::Offset as usize], 0.0, 0.0, 0.0],
+            gain: 1.0,
+            ..OnJoint::default()
+        };
+        let mut out = Parts {
+            joints: model.robot.joints.iter().map(plain).collect(),
+            couplings: Vec::new(),
+            base: None,
+        };
+        for element in model.remarks.iter().filter_map(|r| r.element.as_ref()) {
+            let joints = &mut out.joints;
+            match element {
+                Element::Drag {
+                    joint,
+                    power,
+                    factor,
+                } => {
+                    joints[*joint].damping[usize::from(*power) - 1] += factor;
+                }
+                Element::Spring {
+                    joint,
+                    coefficients,
+                } => {
+                    let sum = joints[*joint].spring.iter_mut().zip(coefficients);
+                    sum.for_each(|(s, c)| *s += c);
+                }
+                Element::Coupling { .. } => {
+                    if Mujoco.element(element) == Form::Native {
+                        out.couplings.push(element);
+                    }
+                }
+                Element::Gain { joint, error } => joints[*joint].gain /= 1.0 + error,
+                Element::Delay {
+                    joints: of,
+                    seconds,
+                } => {
+                    of.iter()
+                        .for_each(|j| joints[*j].delay += (-seconds).max(0.0));
+                }
+                Element::Twist {
+                    joint,
+                    stiffness,
+                    cubic,
+                    damping,
+                    gap,
+                } => {
+                    // a gap is a function
+                    let spring = [*stiffness, *cubic, *damping];
+                    joints[*joint].twist = Some(if *gap > 0.0 { [0.0; 3] } else { spring });
+                }
+                Element::Base { .. } => out.base = Some(element),
+                Element::Function(f) => {
+                    if matches!(f.kind, Kind::Torque | Kind::Memory) {
+                        let dry = &mut joints[f.joint].coulomb;
+                        *dry = dry.max(SOME_FRICTION);
+                    }
+                }
+            }
+        }
+        out
     }
-    out.push_str("  </worldbody>\n");
+
+    /// Which versions of MuJoCo read this file.
+    fn versions(&self) -> Vec<String> {
+        let curved = |j: &OnJoint| {
+            j.damping[1..]
+                .iter()
+                .chain(&j.spring[2..])
+                .any(|x| *x != 0.0)
+                || j.twist.is_some_and(|t| t[1] != 0.0)
+        };
+        let mut out = Vec::new();
+        if self.joints.iter().any(curved) {
+            out.push("Polynomials of damping and stiffness need MuJoCo 3.7.0 or later.".into());
+        }
+        if self.joints.iter().any(|j| j.delay > 0.0) {
+            out.push("Delays of actuators need MuJoCo 3.5.0 or later.".into());
+        }
+        if !self.couplings.is_empty() {
+            out.push("The inertia of tendons needs MuJoCo 3.3.1 or later.".into());
+        }
+        out
+    }
+
+    /// What is not in the file, nor elsewhere.
+    fn left_out(&self, robot: &Robot) -> Vec<String> {
+        let below = |(j, on): (usize, &OnJoint)| {
+            (on.coulomb < 0.0).then(|| {
+                format!(
+                    "Coulomb friction of {} on {} is not written: MuJoCo has none below zero",
+                    on.coulomb, robot.joints[j].name
+                )
+            })
+        };
+        self.joints.iter().enumerate().filter_map(below).collect()
+    }
+
+    fn text(&self, robot: &Robot) -> String {
+        let mut out = String::new();
+        let g = robot.gravity;
+        let _ = writeln!(
+            out,
+            "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
+             <option timestep=\"{STEP}\" gravity=\"{} {} {}\"/>",
+            escape(&robot.name),
+            g.x,
+            g.y,
+            g.z
+        );
+        // the shortest reference is two steps; the engine raises it to that where a scene has longer ones
+        if self.joints.iter().any(|j| j.coulomb > 0.0) || !self.couplings.is_empty() {
+            let stiff = "solreffriction=\"0.0001 1\" solimpfriction=\"0.99 0.99 0.001\"";
+            let _ = writeln!(
+                out,
+                "  <default>\n    <joint {stiff}/>\n    <tendon {stiff}/>\n  </default>"
+            );
+        }
+        out += "  <worldbody>\n";
+        let roots = || (0..robot.bodies.len()).filter(|&b| robot.bodies[b].parent.is_none());
+        match self.base {
+            Some(Element::Base {
+                stiffness,
+                damping,
+                inertia,
+            }) => {
+                let [x, y] = inertia.map(|i| i.max(1e-6));
+                let name = free_name(robot, "base_tilt".into());
+                let _ = writeln!(
+                    out,
+                    "    <body name=\"{name}\">\n      <inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"{x} {y} {}\"/>",
+                    0.999 * (x + y)
+                );
+                let names = base_joints(robot);
+                // about y first, then about x
+                for (axis, direction) in [(1, "0 1 0"), (0, "1 0 0")] {
+                    if stiffness[axis].is_finite() {
+                        let _ = writeln!(
+                            out,
+                            "      <joint name=\"{}\" type=\"hinge\" axis=\"{direction}\" stiffness=\"{}\" \
+                             damping=\"{}\"/>",
+                            names[axis], stiffness[axis], damping[axis]
+                        );
+                    }
+                }
+                roots().for_each(|b| self.body(robot, b, 3, &mut out));
+                out += "    </body>\n";
+            }
+            _ => roots().for_each(|b| self.body(robot, b, 2, &mut out)),
+        }
+        out += "  </worldbody>\n";
+        self.tendons(robot, &mut out);
+        followers(robot, &mut out);
+        self.actuators(robot, &mut out);
+        out += "</mujoco>\n";
+        out
+    }
+
+    fn body(&self, robot: &Robot, index: usize, depth: usize, out: &mut String) {
+        let body = &robot.bodies[index];
+        let pad = "  ".repeat(depth);
+        let q = UnitQuaternion::from_matrix(&body.rotation);
+        let p = body.position;
+        let _ = writeln!(
+            out,
+            "{pad}<body name=\"{}\" pos=\"{} {} {}\" quat=\"{} {} {} {}\">",
+            escape(&body.name),
+            p.x,
+            p.y,
+            p.z,
+            q.w,
+            q.i,
+            q.j,
+            q.k
+        );
+        let inertia = solid(&body.inertia);
+        if let Some(c) = inertia.com() {
+            let i = inertia.tensor_com();
+            let _ = writeln!(
+                out,
+                "{pad}  <inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/>",
+                c.x,
+                c.y,
+                c.z,
+                inertia.mass(),
+                i.m11,
+                i.m22,
+                i.m33,
+                i.m12,
+                i.m13,
+                i.m23
+            );
+        }
+        let joint = &robot.joints[body.coordinate];
+        let leads = body.joint_name == joint.name;
+        let kind = match body.motion {
+            Motion::Revolute => "hinge",
+            Motion::Prismatic => "slide",
+        };
+        let axis = format!("{} {} {}", body.axis.x, body.axis.y, body.axis.z);
+        let mut attributes = String::new();
+        if leads && joint.limits.position.iter().all(|x| x.is_finite()) {
+            let [low, high] = joint.limits.position;
+            let _ = write!(attributes, " range=\"{low} {high}\"");
+        }
+        if leads {
+            attributes += &self.joints[body.coordinate].attributes();
+        }
+        let _ = writeln!(
+            out,
+            "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{axis}\"{attributes}/>",
+            escape(&body.joint_name),
+        );
+        if let Some([stiffness, cubic, damping]) =
+            self.joints[body.coordinate].twist.filter(|_| leads)
+        {
+            let name = twist_joint(robot, body.coordinate);
+            let spring = match (stiffness, cubic) {
+                (0.0, 0.0) => String::new(),
+                (k, 0.0) => format!(" stiffness=\"{k}\" damping=\"{damping}\""),
+                (k, c) => format!(" stiffness=\"{k} 0 {c}\" damping=\"{damping}\""),
+            };
+            let _ = writeln!(
+                out,
+                "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{axis}\"{spring}/>",
+                escape(&name),
+            );
+        }
+        for child in (0..robot.bodies.len()).filter(|&c| robot.bodies[c].parent == Some(index)) {
+            self.body(robot, child, depth + 1, out);
+        }
+        let _ = writeln!(out, "{pad}</body>");
+    }
+
+    /// What two joints share: a tendon over both.
+    fn tendons(&self, robot: &Robot, out: &mut String) {
+        if self.couplings.is_empty() {
+            return;
+        }
+        *out += "  <tendon>\n";
+        for c in &self.couplings {
+            let Element::Coupling {
+                joints,
+                ratio,
+                coulomb,
+                viscous,
+                inertia,
+            } = c
+            else {
+                continue;
+            };
+            let mut attributes = String::new();
+            for (name, x) in [
+                ("damping", viscous),
+                ("frictionloss", coulomb),
+                ("armature", inertia),
+            ] {
+                if *x != 0.0 {
+                    let _ = write!(attributes, " {name}=\"{x}\"");
+                }
+            }
+            let [a, b] = joints.map(|j| &robot.joints[j].name);
+            let _ = writeln!(
+                out,
+                "    <fixed{attributes}>\n      <joint joint=\"{}\" coef=\"1\"/>\n      \
+                 <joint joint=\"{}\" coef=\"{ratio}\"/>\n    </fixed>",
+                escape(a),
+                escape(b)
+            );
+        }
+        *out += "  </tendon>\n";
+    }
+
+    /// The drives: told a torque or force, they make it.
+    fn actuators(&self, robot: &Robot, out: &mut String) {
+        *out += "  <actuator>\n";
+        for (joint, on) in robot.joints.iter().zip(&self.joints) {
+            let name = escape(&joint.name);
+            let mut attributes = String::new();
+            if on.gain != 1.0 {
+                let _ = write!(attributes, " gainprm=\"{}\"", on.gain);
+            }
+            let effort = joint.limits.effort;
+            if effort.is_finite() && effort > 0.0 {
+                let _ = write!(attributes, " forcerange=\"-{effort} {effort}\"");
+            }
+            if on.delay > 0.0 {
+                let samples = (on.delay / STEP).ceil() as usize + 1;
+                let _ = write!(attributes, " delay=\"{}\" nsample=\"{samples}\"", on.delay);
+            }
+            let _ = writeln!(
+                out,
+                "    <general name=\"{name}\" joint=\"{name}\"{attributes}/>"
+            );
+        }
+        *out += "  </actuator>\n";
+    }
+}
+
+impl OnJoint {
+    fn attributes(&self) -> String {
+        let mut out = String::new();
+        let used = |x: &[f64]| x.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
+        let list = |x: &[f64]| -> String {
+            let all: Vec<String> = x.iter().map(f64::to_string).collect();
+            all.join(" ")
+        };
+        if used(&self.damping) > 0 {
+            let _ = write!(
+                out,
+                " damping=\"{}\"",
+                list(&self.damping[..used(&self.damping)])
+            );
+        }
+        if self.coulomb > 0.0 {
+            let _ = write!(out, " frictionloss=\"{}\"", self.coulomb);
+        }
+        if self.armature > 0.0 {
+            let _ = write!(out, " armature=\"{}\"", self.armature);
+        }
+        if let Some((stiffness, at)) = spring(self.spring) {
+            let stiffness = list(&stiffness[..used(&stiffness)]);
+            let _ = write!(out, " stiffness=\"{stiffness}\" springref=\"{at}\"");
+        }
+        out
+    }
+}
+
+/// A torque `Σ c_k q^k` as a spring: the factors of the first three powers of the way from where it is zero, and
+/// that position. `None` where there is no torque, or none is zero anywhere.
+fn spring(c: [f64; 4]) -> Option<([f64; 3], f64)> {
+    if c == [0.0; 4] {
+        return None;
+    }
+    if c[1..] == [0.0; 3] {
+        return Some(([FAR * c[0].abs(), 0.0, 0.0], -c[0].signum() / FAR));
+    }
+    let value = |q: f64| c[0] + q * (c[1] + q * (c[2] + q * c[3]));
+    let mut reach = 1.0;
+    let (mut low, mut high) = (0.0, 0.0);
+    while value(low) * value(high) > 0.0 || low == high {
+        if reach > 1e9 {
+            return None;
+        }
+        // to the nearer side first
+        (low, high) = if value(0.0) * value(reach) <= 0.0 {
+            (0.0, reach)
+        } else {
+            (-reach, 0.0)
+        };
+        reach *= 1.5;
+    }
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        match value(low) * value(middle) <= 0.0 {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    let r = 0.5 * (low + high);
+    let factors = [
+        c[1] + r * (2.0 * c[2] + 3.0 * r * c[3]),
+        c[2] + 3.0 * r * c[3],
+        c[3],
+    ];
+    Some((factors, r))
+}
+
+/// Joints that follow others.
+fn followers(robot: &Robot, out: &mut String) {
     let followers: Vec<&Body> = robot
         .bodies
         .iter()
         .filter(|b| b.joint_name != robot.joints[b.coordinate].name)
         .collect();
-    if !followers.is_empty() {
-        out.push_str("  <equality>\n");
-        for b in followers {
-            let _ = writeln!(
-                out,
-                "    <joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
-                escape(&b.joint_name),
-                escape(&robot.joints[b.coordinate].name),
-                b.offset,
-                b.ratio
-            );
-        }
-        out.push_str("  </equality>\n");
+    if followers.is_empty() {
+        return;
     }
-    out.push_str("</mujoco>\n");
-    out
-}
-
-fn mujoco_body(robot: &Robot, index: usize, depth: usize, out: &mut String) {
-    let body = &robot.bodies[index];
-    let pad = "  ".repeat(depth);
-    let q = UnitQuaternion::from_matrix(&body.rotation);
-    let p = body.position;
-    let _ = writeln!(
-        out,
-        "{pad}<body name=\"{}\" pos=\"{} {} {}\" quat=\"{} {} {} {}\">",
-        escape(&body.name),
-        p.x,
-        p.y,
-        p.z,
-        q.w,
-        q.i,
-        q.j,
-        q.k
-    );
-    let inertia = solid(&body.inertia);
-    if let Some(c) = inertia.com() {
-        let i = inertia.tensor_com();
+    *out += "  <equality>\n";
+    for b in followers {
         let _ = writeln!(
             out,
-            "{pad}  <inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/>",
-            c.x,
-            c.y,
-            c.z,
-            inertia.mass(),
-            i.m11,
-            i.m22,
-            i.m33,
-            i.m12,
-            i.m13,
-            i.m23
+            "    <joint joint1=\"{}\" joint2=\"{}\" polycoef=\"{} {} 0 0 0\"/>",
+            escape(&b.joint_name),
+            escape(&robot.joints[b.coordinate].name),
+            b.offset,
+            b.ratio
         );
     }
-    let joint = &robot.joints[body.coordinate];
-    let kind = match body.motion {
-        Motion::Revolute => "hinge",
-        Motion::Prismatic => "slide",
-    };
-    let mut attributes = String::new();
-    if joint.limits.position.iter().all(|x| x.is_finite()) && body.joint_name == joint.name {
-        let _ = write!(
-            attributes,
-            " range=\"{} {}\"",
-            joint.limits.position[0], joint.limits.position[1]
-        );
-    }
-    if body.joint_name == joint.name {
-        for (name, term) in [
-            ("damping", JointTerm::Viscous),
-            ("frictionloss", JointTerm::Coulomb),
-            ("armature", JointTerm::Armature),
-        ] {
-            let x = joint.terms[term as usize];
-            if x > 0.0 {
-                let _ = write!(attributes, " {name}=\"{x}\"");
-            }
-        }
-    }
-    let _ = writeln!(
-        out,
-        "{pad}  <joint name=\"{}\" type=\"{kind}\" axis=\"{} {} {}\"{attributes}/>",
-        escape(&body.joint_name),
-        body.axis.x,
-        body.axis.y,
-        body.axis.z
-    );
-    for child in (0..robot.bodies.len()).filter(|&c| robot.bodies[c].parent == Some(index)) {
-        mujoco_body(robot, child, depth + 1, out);
-    }
-    let _ = writeln!(out, "{pad}</body>");
+    *out += "  </equality>\n";
 }

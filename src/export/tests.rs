@@ -97,7 +97,7 @@ fn what_stands_in_comments_does_not_break_the_file() {
         equation: "a sin kNq",
         values: vec!["amplitude = 1 N m".into()],
         held: None,
-        notes: Default::default(),
+        element: None,
     };
     let model = Model {
         plant: &plant,

@@ -8,4 +8,5 @@ mod findings;
 mod next;
 mod parallel;
 mod real;
+mod simulators;
 mod thresholds;

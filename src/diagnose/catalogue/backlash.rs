@@ -49,13 +49,15 @@ impl Effect for Backlash {
         k < 2
     }
 
-    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
-        let (joint, half) = (cx.name(e.place.first()), 0.5 * e.shape[0]);
-        (format == "MuJoCo").then(|| {
-            format!(
-                "joint \"{joint}\": a joint of range=\"{:.6} {half:.6}\" in series",
-                -half
-            )
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let joint = e.place.first();
+        let [stiffness, damping, _] = spring::constants(cx, joint, e.shape[1], e.shape[2]);
+        Some(Element::Twist {
+            joint,
+            stiffness,
+            cubic: 0.0,
+            damping,
+            gap: e.shape[0],
         })
     }
 

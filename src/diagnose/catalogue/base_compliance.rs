@@ -40,6 +40,25 @@ impl Effect for BaseCompliance {
         true
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let base = cx.base()?;
+        let omega = 2.0 * std::f64::consts::PI * e.shape[0];
+        // a coefficient below 1 is a base that is heavy itself; none is one that does not tilt
+        let of = |axis: usize| {
+            let mean = base.mass[axis].iter().sum::<f64>() / base.mass[axis].len() as f64;
+            let share = e.eta[axis].max(0.0);
+            let stiffness = mean * omega * omega / share;
+            let damping = 2.0 * e.shape[1] * mean * omega / share;
+            [stiffness, damping, mean * (1.0 / share - 1.0)]
+        };
+        let [x, y] = [of(0), of(1)];
+        Some(Element::Base {
+            stiffness: [x[0], y[0]],
+            damping: [x[1], y[1]],
+            inertia: [x[2], y[2]],
+        })
+    }
+
     fn columns(&self, cx: &Context, _place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let Some(load) = cx.base() else {
             return Vec::new();

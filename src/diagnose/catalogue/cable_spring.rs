@@ -38,17 +38,22 @@ impl Effect for CableSpring {
         2
     }
 
-    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
-        let [a, b] = cx.data.range[e.place.first()];
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let joint = e.place.first();
+        let [a, b] = cx.data.range[joint];
         let (middle, half) = (0.5 * (a + b), (0.5 * (b - a)).max(1e-9));
-        let stiffness = e.eta[1] / half;
-        // the joint pulls by −k (q − q₀), which the motor holds
-        (format == "MuJoCo" && stiffness != 0.0).then(|| {
-            format!(
-                "joint \"{}\": stiffness=\"{stiffness:.6}\" springref=\"{:.6}\"",
-                cx.name(e.place.first()),
-                middle - e.eta[0] / stiffness
-            )
+        // Σ η_p ((q − m)/h)^p in powers of q
+        let mut coefficients = [0.0; 4];
+        let mut power = [1.0, 0.0, 0.0, 0.0];
+        for eta in &e.eta {
+            let sum = coefficients.iter_mut().zip(power);
+            sum.for_each(|(c, p)| *c += eta * p);
+            let lower = [0.0, power[0], power[1], power[2]];
+            power = std::array::from_fn(|k| (lower[k] - middle * power[k]) / half);
+        }
+        Some(Element::Spring {
+            joint,
+            coefficients,
         })
     }
 

@@ -29,6 +29,13 @@ impl Effect for Cogging {
         super::cogging::orders(cx, place.first())
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let [sine, cosine, k] = [e.eta[0], e.eta[1], e.shape[0]].map(py);
+        let torque = format!("{sine} * xp.sin({k} * q) + {cosine} * xp.cos({k} * q)");
+        Some(Element::smooth(j, 1e-3 * cx.data.speed[j], torque))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let (j, k) = (place.first(), shape[0]);
         vec![

@@ -42,6 +42,25 @@ impl Effect for Counterbalance {
         -0.5
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let waves = [
+            "xp.sin(q)",
+            "xp.cos(q)",
+            "xp.sin(2.0 * q)",
+            "xp.cos(2.0 * q)",
+        ];
+        let parts = waves.iter().zip(&e.eta);
+        let parts: Vec<String> = parts
+            .map(|(w, eta)| format!("{} * {w}", py(*eta)))
+            .collect();
+        Some(Element::smooth(
+            j,
+            1e-3 * cx.data.speed[j],
+            parts.join(" + "),
+        ))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let of = |f: fn(f64) -> f64, k: f64| Column::on(j, cx.data.own(j, |q, _| f(k * q)));

@@ -31,6 +31,16 @@ impl Effect for EncoderEccentricity {
             .collect()
     }
 
+    fn element(&self, _cx: &Context, e: &Estimate) -> Option<Element> {
+        let [sine, cosine] = [e.eta[0], e.eta[1]].map(py);
+        let lines = vec![
+            format!("way = {sine} * xp.sin(q) + {cosine} * xp.cos(q)"),
+            format!("slope = {sine} * xp.cos(q) - {cosine} * xp.sin(q)"),
+            "return way, slope * dq, slope * ddq - way * dq**2".into(),
+        ];
+        Some(Element::of(Kind::Displacement, e.place.first(), lines))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let wave = |phase: f64| {

@@ -41,6 +41,16 @@ impl Effect for FrictionAsymmetry {
         1
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let mut torque = format!("{} * xp.abs(dq)", py(e.eta[0]));
+        if e.shape.form == 1 {
+            let [level, v] = [e.eta[1], e.shape[0]].map(py);
+            torque += &format!(" + {level} * (1.0 - xp.exp(-xp.abs(dq) / {v}))");
+        }
+        Some(Element::smooth(j, 1e-3 * cx.data.speed[j], torque))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let mut all = vec![Column::on(j, cx.data.own(j, |_, v| v.abs()))];

@@ -31,6 +31,19 @@ impl Effect for JointCoupling {
         vec![Shape::of(&[1.0]), Shape::of(&[-1.0])]
     }
 
+    fn element(&self, _cx: &Context, e: &Estimate) -> Option<Element> {
+        let Place::Pair(j, k) = e.place else {
+            return None;
+        };
+        Some(Element::Coupling {
+            joints: [j, k],
+            ratio: e.shape[0],
+            coulomb: e.eta[0],
+            viscous: e.eta[1],
+            inertia: e.eta[2],
+        })
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let Place::Pair(j, k) = *place else {
             return Vec::new();

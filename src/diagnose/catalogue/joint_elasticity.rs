@@ -45,14 +45,16 @@ impl Effect for JointElasticity {
         shape[1] > 0.08
     }
 
-    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
-        let stiffness = self.values(cx, e).first()?.value;
-        let joint = cx.name(e.place.first());
-        (format == "MuJoCo").then(|| {
-            format!(
-                "joint \"{joint}\": split it into motor and link joint with stiffness=\"{stiffness:.6}\" \
-                 between them"
-            )
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let joint = e.place.first();
+        let [stiffness, damping, twist] = spring::constants(cx, joint, e.shape[0], e.shape[1]);
+        // a coefficient that is not 1 is a twist that is larger: a softer spring
+        Some(Element::Twist {
+            joint,
+            stiffness: stiffness / e.eta[0],
+            cubic: stiffness * e.shape[2] / (twist * twist) / e.eta[0].powi(3),
+            damping: damping / e.eta[0],
+            gap: 0.0,
         })
     }
 

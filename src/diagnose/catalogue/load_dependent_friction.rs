@@ -24,6 +24,13 @@ impl Effect for LoadDependentFriction {
         [0.7, 1.0, 1.4, 2.0].map(|e| Shape::of(&[e])).to_vec()
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let [level, peak, power] = [e.eta[0], cx.peak[j], e.shape[0]].map(py);
+        let level = format!("{level} * (xp.abs(load) / {peak}) ** {power}");
+        Some(Element::dry(j, T.reversals.sharp * cx.data.speed[j], level))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let values = cx

@@ -3,8 +3,8 @@
 //! An [`Effect`] says where it can sit ([`Effect::places`]), which shape constants it has that do not
 //! enter linearly ([`Effect::shapes`]), and gives the columns that it adds to the torque
 //! ([`Effect::columns`]). All effects of a place and shape are linear in their coefficients. It also says
-//! what its coefficients mean ([`Effect::values`]), how a model holds it ([`Effect::apply`]), how a robot file
-//! can state it otherwise ([`Effect::note`]) and how common it is ([`Effect::familiarity`]). A new effect is one
+//! what its coefficients mean ([`Effect::values`]), how a model holds it ([`Effect::apply`]), what
+//! it is in a simulator otherwise ([`Effect::element`]) and how common it is ([`Effect::familiarity`]). A new effect is one
 //! file and one line in [`all`].
 
 mod backlash;
@@ -44,8 +44,10 @@ pub use context::Context;
 pub use estimate::{Estimate, Place, Quantity, Shape, Value};
 
 use super::column::Column;
+use super::thresholds::THRESHOLDS as T;
 use crate::dynamics::Samples;
-use crate::export::Part;
+use crate::export::element::{Element, Kind, py};
+use crate::export::{Form, Part, remark};
 use crate::plant;
 use crate::robot::{Inertia, JointTerm, Motion, Robot};
 use crate::signals::series::Series;
@@ -138,9 +140,8 @@ pub trait Effect: Sync {
     fn apply(&self, _cx: &Context, _e: &Estimate, _robot: &mut Robot) -> Option<Part> {
         None
     }
-    /// How a format can state what no part of a model holds; `format` is its
-    /// [`name`](crate::export::Format::name).
-    fn note(&self, _cx: &Context, _e: &Estimate, _format: &str) -> Option<String> {
+    /// What it is in a simulator, beside parts of a model.
+    fn element(&self, _cx: &Context, _e: &Estimate) -> Option<Element> {
         None
     }
 }
@@ -178,6 +179,13 @@ pub fn all() -> Vec<Box<dyn Effect>> {
         Box::new(passive_joint_friction::PassiveJointFriction),
         Box::new(leg_inertia::LegInertia),
     ]
+}
+
+/// How the files for MuJoCo hold an effect.
+pub(crate) fn in_mujoco(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Form {
+    let plant = cx.data.plant;
+    let held = effect.apply(cx, e, &mut plant.robot().clone());
+    remark::in_mujoco(plant, held, effect.element(cx, e).as_ref())
 }
 
 /// Adds an effect of one coefficient to a term of its joint.

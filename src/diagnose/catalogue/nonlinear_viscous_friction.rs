@@ -26,6 +26,21 @@ impl Effect for NonlinearViscousFriction {
             .to_vec()
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let (joint, power) = (e.place.first(), e.shape[0]);
+        let top = cx.data.speed[joint];
+        if power == 2.0 || power == 3.0 {
+            return Some(Element::Drag {
+                joint,
+                power: power as u8,
+                factor: e.eta[0] / top.powf(power),
+            });
+        }
+        let [level, at, power] = [e.eta[0], top, power].map(py);
+        let torque = format!("{level} * xp.sign(dq) * (xp.abs(dq) / {at}) ** {power}");
+        Some(Element::smooth(joint, 1e-3 * top, torque))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let top = cx.data.speed[j];

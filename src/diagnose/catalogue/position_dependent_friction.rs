@@ -33,6 +33,13 @@ impl Effect for PositionDependentFriction {
         }
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let [sine, cosine, k] = [e.eta[0], e.eta[1], e.shape[0]].map(py);
+        let level = format!("{sine} * xp.sin({k} * q) + {cosine} * xp.cos({k} * q)");
+        Some(Element::dry(j, 1e-3 * cx.data.speed[j], level))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let width = 1e-3 * cx.data.speed[j];

@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// Springs of the form with many strengths.
+const ELEMENTS: usize = 8;
+
 /// Pre-sliding hysteresis.
 pub struct PreslidingHysteresis;
 
@@ -33,6 +36,38 @@ impl Effect for PreslidingHysteresis {
 
     fn forms(&self) -> u8 {
         3
+    }
+
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let [level, reach] = [e.eta[0], e.shape[0]].map(py);
+        let (start, mut lines) = match e.shape.form {
+            2 => {
+                let slips: Vec<String> = (0..ELEMENTS)
+                    .map(|k| py(2.0 * e.shape[0] * (k as f64 + 0.5) / ELEMENTS as f64))
+                    .collect();
+                let step = format!(
+                    "memory = (q,) + tuple(xp.clip(z + d / s, -1.0, 1.0) for z, s in zip(memory[1:], [{}]))",
+                    slips.join(", ")
+                );
+                let sum = format!("z = sum(memory[1:]) / {ELEMENTS}");
+                (format!("(q,) + {ELEMENTS} * (0.0 * q,)"), vec![step, sum])
+            }
+            form => {
+                let z = match form {
+                    0 => format!(
+                        "xp.sign(d) + (memory[1] - xp.sign(d)) * xp.exp(-xp.abs(d) / {reach})"
+                    ),
+                    _ => format!("xp.clip(memory[1] + d / {reach}, -1.0, 1.0)"),
+                };
+                let after = "memory = (q, z)".to_string();
+                ("(q, 0.0 * q)".to_string(), vec![format!("z = {z}"), after])
+            }
+        };
+        lines.insert(0, "d = q - memory[0]".into());
+        // what builds up takes the place of what turns at once
+        lines.push(format!("return -{level}, {level} * z, memory"));
+        Some(Element::memory(j, 1e-3 * cx.data.speed[j], &start, lines))
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
@@ -86,7 +121,7 @@ struct Bristles {
     /// 0 exponential (Dahl), 1 one spring that slips, 2 springs of many strengths
     form: u8,
     at: f64,
-    z: [f64; 8],
+    z: [f64; ELEMENTS],
 }
 
 impl Bristles {
@@ -95,7 +130,7 @@ impl Bristles {
             reach,
             form,
             at,
-            z: [0.0; 8],
+            z: [0.0; ELEMENTS],
         }
     }
 

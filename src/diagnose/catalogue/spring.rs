@@ -1,5 +1,6 @@
 //! A mass on springs, with or without a gap between them.
 
+use super::Context;
 use crate::diagnose::window::{FINE, from_fine};
 
 /// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J`, where `T`
@@ -70,4 +71,17 @@ pub(crate) fn way(
         from_fine(&all, n, &mut out);
         out
     })
+}
+
+/// Stiffness and damping of a spring on which the link of an actuator swings with a frequency, Hz, and a damping
+/// ratio, and its twist under the largest load: what [`way`] takes them for.
+pub(crate) fn constants(cx: &Context, j: usize, frequency: f64, damping: f64) -> [f64; 3] {
+    let omega = 2.0 * std::f64::consts::PI * frequency;
+    let mean = cx.mass[j][j].iter().sum::<f64>() / cx.data.rows() as f64;
+    let stiffness = mean * omega * omega;
+    [
+        stiffness,
+        2.0 * damping * mean * omega,
+        cx.peak[j] / stiffness,
+    ]
 }

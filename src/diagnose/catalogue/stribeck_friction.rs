@@ -31,6 +31,13 @@ impl Effect for StribeckFriction {
         k == 0
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let [rise, v, power] = [e.eta[0], e.shape[0], e.shape[1]].map(py);
+        let level = format!("{rise} * xp.exp(-(xp.abs(dq) / {v}) ** {power})");
+        Some(Element::dry(j, 1e-3 * cx.data.speed[j], level))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let width = 1e-3 * cx.data.speed[j];

@@ -50,17 +50,34 @@ impl Effect for ThermalFriction {
         2
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let (top, [fc, fv]) = (cx.data.speed[j], heating(cx, j));
+        let [time, bend] = [e.shape[0], e.shape[1]];
+        let [dry, viscous] = [e.eta[0], e.eta[1]].map(py);
+        let [fc, fv] = [fc / top / (fc + fv), fv / (top * top) / (fc + fv)].map(py);
+        let lines = vec![
+            format!("power = {fc} * xp.abs(dq) + {fv} * dq**2"),
+            format!("memory = memory + dt / {} * (power - memory)", py(time)),
+            match bend > 0.0 {
+                true => format!("warm = (1.0 - xp.exp(-{bend:?} * memory)) / {bend:?}"),
+                false => "warm = memory".into(),
+            },
+            format!("return {dry} * warm, {viscous} * warm * dq, memory"),
+        ];
+        Some(Element::memory(
+            j,
+            T.reversals.sharp * top,
+            "0.0 * q",
+            lines,
+        ))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         // warmth from the power of friction; it lasts from record to record in the order of the
         // experiment, or every record starts cold
-        let actuator = cx.data.plant.actuators()[j];
-        let top = cx.data.speed[j];
-        let [_, viscous, coulomb, _] = actuator.terms;
-        let (fc, fv) = match coulomb + viscous > 0.0 {
-            true => (coulomb, viscous * top),
-            false => (1.0, 1.0),
-        };
+        let (top, [fc, fv]) = (cx.data.speed[j], heating(cx, j));
         let power = |v: f64| (fc * v.abs() / top + fv * (v / top).powi(2)) / (fc + fv);
         let mut order: Vec<usize> = (0..cx.data.records.len()).collect();
         order.sort_by_key(|k| cx.data.records[*k].order);
@@ -106,5 +123,14 @@ impl Effect for ThermalFriction {
             constant("time_constant", shape[0], "s"),
             constant("lasts_over_records", f64::from(shape.form == LASTS), ""),
         ]
+    }
+}
+
+/// Dry and viscous friction at the largest speed, by which a joint warms itself.
+fn heating(cx: &Context, j: usize) -> [f64; 2] {
+    let [_, viscous, coulomb, _] = cx.data.plant.actuators()[j].terms;
+    match coulomb + viscous > 0.0 {
+        true => [coulomb, viscous * cx.data.speed[j]],
+        false => [1.0, 1.0],
     }
 }

@@ -24,9 +24,11 @@ impl Effect for TorqueConstant {
         cx.singles()
     }
 
-    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
-        let (joint, gain) = (cx.name(e.place.first()), 1.0 / (1.0 + e.eta[0]));
-        (format == "MuJoCo").then(|| format!("actuator \"{joint}\": gainprm=\"{gain:.6}\""))
+    fn element(&self, _cx: &Context, e: &Estimate) -> Option<Element> {
+        Some(Element::Gain {
+            joint: e.place.first(),
+            error: e.eta[0],
+        })
     }
 
     fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {

@@ -38,10 +38,11 @@ impl Effect for TorqueDelay {
         true
     }
 
-    fn note(&self, cx: &Context, e: &Estimate, format: &str) -> Option<String> {
-        let delay = self.values(cx, e).first()?.value;
-        (format == "MuJoCo")
-            .then(|| format!("actuators: delay of {delay:.6} s (dyntype filter or a buffer)"))
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        Some(Element::Delay {
+            joints: e.place.actuators(cx.data.joints()),
+            seconds: e.shape[0] * e.eta[0],
+        })
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {

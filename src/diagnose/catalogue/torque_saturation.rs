@@ -43,6 +43,20 @@ impl Effect for TorqueSaturation {
         1
     }
 
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        let j = e.place.first();
+        let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));
+        let [loss, peak, at] = [e.eta[0], peak, e.shape[0]].map(py);
+        let part = match e.shape.form {
+            EXPONENT => format!("(xp.abs(tau) / {peak}) ** {at}"),
+            _ => format!("xp.clip(xp.abs(tau) / {peak} - {at}, 0.0, None)"),
+        };
+        let lines = vec![format!(
+            "return tau + {loss} * {peak} * xp.sign(tau) * {part}"
+        )];
+        Some(Element::of(Kind::Drive, j, lines))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));

@@ -28,6 +28,18 @@ impl Effect for TransmissionError {
         super::cogging::orders(cx, place.first())
     }
 
+    fn element(&self, _cx: &Context, e: &Estimate) -> Option<Element> {
+        let k = e.shape[0];
+        let [sine, cosine, order] = [e.eta[0] / (k * k), e.eta[1] / (k * k), k].map(py);
+        let lines = vec![
+            format!("sine, cosine = xp.sin({order} * q), xp.cos({order} * q)"),
+            format!("way = {sine} * sine + {cosine} * cosine"),
+            format!("slope = {order} * ({sine} * cosine - {cosine} * sine)"),
+            format!("return way, slope * dq, slope * ddq - {order} ** 2 * way * dq**2"),
+        ];
+        Some(Element::of(Kind::Displacement, e.place.first(), lines))
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
         let (j, k) = (place.first(), shape[0]);
         // second derivative of sin kq: k q̈ cos kq − k² q̇² sin kq; per 1/k² to keep numbers near 1

@@ -1,0 +1,263 @@
+//! `effects.py`: what a model has and MuJoCo has no element for, as functions of state and time step.
+//!
+//! The file needs NumPy, and MuJoCo where it is installed in a model; nothing of excite. Its functions are pure,
+//! and take the array module (NumPy, JAX, Torch) as an argument.
+
+use super::element::{Element, Function, Kind, py};
+use super::mujoco::{Mujoco, base_joints, twist_joint};
+use super::{Form, Format, Model, Part, Remark};
+use crate::error::Result;
+use crate::plant::Plant;
+use crate::robot::{Motion, Robot};
+use serde_json::json;
+use std::fmt::Write;
+
+/// Name of the file.
+pub const FILE: &str = "effects.py";
+
+/// Speed over which the sign of a velocity turns where no effect says it, over the largest speed.
+const SHARP: f64 = 1e-3;
+
+/// What is the same in every file.
+const RUNTIME: &str = include_str!("runtime.py");
+
+/// The file of functions beside MuJoCo's XML.
+pub struct Effects;
+
+impl Format for Effects {
+    fn name(&self) -> &'static str {
+        "effects.py"
+    }
+
+    fn file(&self) -> &'static str {
+        FILE
+    }
+
+    fn holds(&self, plant: &Plant) -> bool {
+        Mujoco.holds(plant)
+    }
+
+    fn has(&self, _part: Part) -> bool {
+        false
+    }
+
+    fn element(&self, element: &Element) -> Form {
+        match element {
+            Element::Drag { .. } | Element::Spring { .. } | Element::Coupling { .. } => Form::None,
+            _ => Form::Callback,
+        }
+    }
+
+    fn needed(&self, model: &Model) -> bool {
+        let elements = model.remarks.iter().filter_map(|r| r.element.as_ref());
+        elements.into_iter().any(|e| self.element(e) != Form::None)
+    }
+
+    fn write(&self, model: &Model) -> Result<String> {
+        Ok(text(model))
+    }
+}
+
+/// Tables that the functions stand in, line by line.
+#[derive(Default)]
+struct Tables {
+    added: Vec<String>,
+    remembered: Vec<String>,
+    displaced: Vec<String>,
+    drives: Vec<String>,
+    delayed: Vec<String>,
+    free: Vec<String>,
+    widths: Vec<Option<f64>>,
+}
+
+fn text(model: &Model) -> String {
+    let robot = model.robot;
+    let mut out = format!(
+        "\"\"\"Effects of {} that MuJoCo has no element for, found by `excite diagnose`; belongs to robot.xml.\n\n    \
+         import mujoco, effects\n    model = mujoco.MjModel.from_xml_path(\"robot.xml\")\n    \
+         effects.install(model)                      # mj_step and mj_inverse have them now\n    \
+         tau = effects.inverse(model, q, dq, ddq, dt)  # torque along a motion (samples, joints)\n\n\
+         SI units. The functions are pure: arrays in, arrays out, of NumPy, JAX or Torch (`xp`).\n\n",
+        one_line(&robot.name)
+    );
+    let mut functions = String::new();
+    let mut tables = Tables {
+        widths: vec![None; robot.dof()],
+        ..Tables::default()
+    };
+    for (k, remark) in model.remarks.iter().enumerate() {
+        let Some(element) = &remark.element else {
+            continue;
+        };
+        if Effects.element(element) == Form::None {
+            continue;
+        }
+        let _ = writeln!(
+            out,
+            "{} ({}): {}\n    {}",
+            remark.effect,
+            one_line(&remark.place),
+            remark.equation,
+            remark.values.join("\n    ")
+        );
+        let name = format!("{}_{}", remark.effect, k + 1);
+        add(&name, remark, element, robot, &mut functions, &mut tables);
+    }
+    out += "\"\"\"\n\nimport numpy as np\n\n";
+    let names: Vec<String> = robot
+        .joints
+        .iter()
+        .map(|j| json!(j.name).to_string())
+        .collect();
+    let width = |(w, j): (&Option<f64>, &crate::robot::Joint)| {
+        let top = j.limits.velocity;
+        py(w.unwrap_or(if top.is_finite() { SHARP * top } else { SHARP }))
+    };
+    let widths: Vec<String> = tables.widths.iter().zip(&robot.joints).map(width).collect();
+    let _ = writeln!(out, "# the joints, in the order of all arrays");
+    let _ = writeln!(out, "JOINTS = [{}]", names.join(", "));
+    let _ = writeln!(
+        out,
+        "# speed over which the sign of a velocity turns in `torque`, rad/s or m/s"
+    );
+    let _ = writeln!(out, "WIDTH = [{}]", widths.join(", "));
+    out += &functions;
+    out += "\n\n";
+    for (what, name, rows) in [
+        ("joint, function of the state", "ADDED", &tables.added),
+        (
+            "joint, function of the state and a memory, its key, its start",
+            "REMEMBERED",
+            &tables.remembered,
+        ),
+        (
+            "joint, way of the joint beyond what its encoder reads",
+            "DISPLACED",
+            &tables.displaced,
+        ),
+        (
+            "joint, what its drive reports, whether the actuator in robot.xml has it",
+            "DRIVES",
+            &tables.drives,
+        ),
+        (
+            "joint, s by which what its drive reports is late",
+            "DELAYED",
+            &tables.delayed,
+        ),
+        (
+            "joints of robot.xml without a drive, the force on them",
+            "FREE",
+            &tables.free,
+        ),
+    ] {
+        let _ = writeln!(out, "# {what}\n{name} = [{}]", rows.join(", "));
+    }
+    out + RUNTIME
+}
+
+/// Text that stands in a documentation string on one line.
+fn one_line(text: &str) -> String {
+    text.replace(['\n', '\r'], " ")
+        .replace('\\', "/")
+        .replace('"', "'")
+}
+
+fn add(
+    name: &str,
+    remark: &Remark,
+    element: &Element,
+    robot: &Robot,
+    functions: &mut String,
+    tables: &mut Tables,
+) {
+    let head = |arguments: &str| {
+        let turning = match element {
+            Element::Function(f) => robot.joints[f.joint].motion == Motion::Revolute,
+            _ => true,
+        };
+        let [force, way] = if turning { ["N m", "rad"] } else { ["N", "m"] };
+        format!(
+            "\n\ndef {name}({arguments}):\n    \"\"\"{} ({}): {}; {force}, {way}, s.\"\"\"\n",
+            remark.effect,
+            one_line(&remark.place),
+            remark.equation
+        )
+    };
+    let body =
+        |lines: &[String]| -> String { lines.iter().map(|l| format!("    {l}\n")).collect() };
+    match element {
+        Element::Function(Function {
+            kind,
+            joint,
+            width,
+            body: lines,
+            start,
+        }) => {
+            let arguments = match kind {
+                Kind::Torque => "q, dq, load, xp=np",
+                Kind::Memory => "q, dq, load, dt, memory, xp=np",
+                Kind::Displacement => "q, dq, ddq, xp=np",
+                Kind::Drive => "tau, xp=np",
+            };
+            *functions += &head(arguments);
+            *functions += &body(lines);
+            match kind {
+                Kind::Torque => tables.added.push(format!("({joint}, {name})")),
+                Kind::Memory => tables.remembered.push(format!(
+                    "({joint}, {name}, \"{name}\", lambda q, xp: {})",
+                    start.as_deref().unwrap_or("0.0 * q")
+                )),
+                Kind::Displacement => tables.displaced.push(format!("({joint}, {name})")),
+                Kind::Drive => tables.drives.push(format!("({joint}, {name}, False)")),
+            }
+            if matches!(kind, Kind::Torque | Kind::Memory) {
+                let w = tables.widths[*joint].unwrap_or(f64::INFINITY);
+                tables.widths[*joint] = Some(w.min(*width));
+            }
+        }
+        Element::Gain { joint, error } => {
+            *functions += &head("tau, xp=np");
+            *functions += &format!("    return {} * tau\n", py(1.0 + error));
+            tables.drives.push(format!("({joint}, {name}, True)"));
+        }
+        Element::Delay { joints, seconds } => {
+            let rows = joints.iter().map(|j| format!("({j}, {})", py(*seconds)));
+            tables.delayed.extend(rows);
+        }
+        Element::Twist {
+            joint,
+            stiffness,
+            cubic,
+            damping,
+            gap,
+        } => {
+            let force = match *gap > 0.0 {
+                false => "None",
+                true => {
+                    *functions += &head("x, v, xp=np");
+                    let (k, k3, d, half) =
+                        (py(*stiffness), py(*cubic), py(*damping), py(0.5 * gap));
+                    *functions += &body(&[
+                        format!("beyond = x - xp.clip(x, -{half}, {half})"),
+                        format!("spring = -{k} * beyond - {k3} * beyond**3"),
+                        "# flanks push only while they touch".into(),
+                        format!("damped = spring - {d} * v * (beyond != 0.0)"),
+                        "return xp.where(damped * spring > 0.0, damped, 0.0 * x)".into(),
+                    ]);
+                    name
+                }
+            };
+            let free = twist_joint(robot, *joint);
+            tables.free.push(format!("({}, {force})", json!(free)));
+        }
+        Element::Base { stiffness, .. } => {
+            for (axis, name) in base_joints(robot).iter().enumerate() {
+                if stiffness[axis].is_finite() {
+                    tables.free.push(format!("({}, None)", json!(name)));
+                }
+            }
+        }
+        Element::Drag { .. } | Element::Spring { .. } | Element::Coupling { .. } => {}
+    }
+}

@@ -1,0 +1,210 @@
+
+
+def start(q, xp=np):
+    """Memory of the effects before the first sample at the positions q (..., joints), rad or m."""
+    return {key: begin(q[..., j], xp) for j, _, key, begin in REMEMBERED}
+
+
+def parts(q, dq, load, dt, memory, xp=np):
+    """Per joint: levels of dry friction, which acts against the velocity, other torque, N m or N; the next memory.
+
+    q, dq: positions and velocities (..., joints), rad or m and per s; load: torque of the rigid bodies (..., joints);
+    dt: time since `memory`, s; memory: from `start` or from the last call; xp: numpy, jax.numpy or torch.
+    """
+    dry = [0.0 * q[..., j] for j in range(len(JOINTS))]
+    other = list(dry)
+    after = dict(memory)
+    for j, f in ADDED:
+        level, more = f(q[..., j], dq[..., j], load[..., j], xp)
+        dry[j], other[j] = dry[j] + level, other[j] + more
+    for j, f, key, _ in REMEMBERED:
+        level, more, after[key] = f(q[..., j], dq[..., j], load[..., j], dt, memory[key], xp)
+        dry[j], other[j] = dry[j] + level, other[j] + more
+    return dry, other, after
+
+
+def torque(q, dq, load, dt, memory, xp=np):
+    """Torque that the effects add to inverse dynamics (..., joints), N m or N, and the next memory; see `parts`."""
+    dry, other, after = parts(q, dq, load, dt, memory, xp)
+    both = [o + d * xp.tanh(dq[..., j] / WIDTH[j]) for j, (d, o) in enumerate(zip(dry, other))]
+    return xp.stack(both, -1), after
+
+
+def displacement(q, dq, ddq, xp=np):
+    """Way of the joints beyond what their encoders read, rad or m, its rate and acceleration (..., joints)."""
+    way = [[0.0 * q[..., j] for j in range(len(JOINTS))] for _ in range(3)]
+    for j, f in DISPLACED:
+        for rows, x in zip(way, f(q[..., j], dq[..., j], ddq[..., j], xp)):
+            rows[j] = rows[j] + x
+    return tuple(xp.stack(rows, -1) for rows in way)
+
+
+def encoder(q, xp=np):
+    """What the encoders read where the joints stand at q (..., joints), rad or m."""
+    read = q
+    for _ in range(20):
+        read = q - displacement(read, 0.0 * q, 0.0 * q, xp)[0]
+    return read
+
+
+def reported(tau, xp=np):
+    """Torque that the drives report where they make tau (..., joints), N m or N, without their delay."""
+    out = [tau[..., j] for j in range(len(JOINTS))]
+    for j, f, _ in DRIVES:
+        out[j] = out[j] + f(tau[..., j], xp) - tau[..., j]
+    return xp.stack(out, -1)
+
+
+def command(told, xp=np):
+    """What the actuators of robot.xml are to be told (`data.ctrl`) where the drives are told `told` (..., joints).
+
+    They have the gains and delays of the drives; what they have not is taken off here, N m or N.
+    """
+    tau = told
+    for _ in range(60):
+        less = [0.0 * tau[..., j] for j in range(len(JOINTS))]
+        for j, f, native in DRIVES:
+            if not native:
+                less[j] = less[j] + f(tau[..., j], xp) - tau[..., j]
+        tau = 0.5 * tau + 0.5 * (told - xp.stack(less, -1))
+    return tau
+
+
+class Installed:
+    """The callback of one model: adds the effects to `qfrc_passive`, and remembers what they need, data by data."""
+
+    def __init__(self, model):
+        joints = [model.joint(name) for name in JOINTS]
+        free = [model.joint(name) for name, _ in FREE]
+        self.address = model._address
+        self.at = np.array([joint.qposadr[0] for joint in joints], int)
+        self.dof = np.array([joint.dofadr[0] for joint in joints], int)
+        self.free_at = np.array([joint.qposadr[0] for joint in free], int)
+        self.free_dof = np.array([joint.dofadr[0] for joint in free], int)
+        self.load = np.zeros(model.nv)
+        # dry friction that is not left to the solver, N m or N
+        self.loss = np.zeros(len(joints))
+        self.memory = {}
+
+    def __call__(self, model, data):
+        if model._address != self.address:
+            return
+        import mujoco
+
+        q, dq = data.qpos[self.at], data.qvel[self.dof]
+        time, before = self.memory.get(data._address, (np.inf, None))
+        if data.time < time:
+            # a new run
+            time, before = data.time, start(q)
+        # with the acceleration of the last step, or that which mj_inverse is asked for
+        mujoco.mj_rne(model, data, 1, self.load)
+        dry, other, after = parts(q, dq, self.load[self.dof], data.time - time, before)
+        self.memory[data._address] = (data.time, after)
+        friction = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+        for j, dof in enumerate(self.dof):
+            force, level = float(other[j]), float(dry[j]) + self.loss[j]
+            if level != 0.0:
+                # the solver's own friction holds what can be held, exactly at standstill
+                for row in np.flatnonzero(friction & (data.efc_id[: data.nefc] == dof)):
+                    level += model.dof_frictionloss[dof]
+                    data.efc_frictionloss[row] = max(level, 0.0)
+                    if getattr(data, "nisland", 0) and row < len(data.map_efc2iefc):
+                        # the copy that the solver of mj_step reads
+                        data.iefc_frictionloss[data.map_efc2iefc[row]] = max(level, 0.0)
+                    level = min(level, 0.0)
+                force += level * float(np.tanh(dq[j] / WIDTH[j]))
+            data.qfrc_passive[dof] -= force
+        for (_, f), at, dof in zip(FREE, self.free_at, self.free_dof):
+            if f is not None:
+                data.qfrc_passive[dof] += f(data.qpos[at], data.qvel[dof])
+
+
+def install(model):
+    """Makes MuJoCo add the effects in every mj_step, mj_forward and mj_inverse of this model (`mjcb_passive`).
+
+    `mujoco.set_mjcb_passive(None)` takes them out again. What acts in drives and encoders is not a force: use
+    `command` before mj_step, `encoder` for what is read, and `inverse` along a motion.
+    """
+    import mujoco
+
+    installed = Installed(model)
+    mujoco.set_mjcb_passive(installed)
+    return installed
+
+
+def inverse(model, q, dq, ddq, dt, substep=2e-4):
+    """Torque that the drives report along a motion (samples, joints), N m or N, all effects included.
+
+    model: robot.xml as MuJoCo loads it; q, dq, ddq: what the encoders read (samples, joints), with its derivatives;
+    dt: time between samples, s. Joints that no drive moves are integrated from rest on their springs.
+    """
+    import mujoco
+
+    q, dq, ddq = (np.asarray(x, float) for x in (q, dq, ddq))
+    data = mujoco.MjData(model)
+    previous, flags = mujoco.get_mjcb_passive(), int(model.opt.disableflags)
+    bits = mujoco.mjtDisableBit
+    model.opt.disableflags = flags | int(bits.mjDSBL_CONTACT) | int(bits.mjDSBL_LIMIT)
+    here = install(model)
+    free, at = here.free_dof, here.free_at
+    tau = np.zeros_like(q)
+    # the solver's friction takes its sign from the acceleration too; along a motion that of the velocity is known
+    here.loss = model.dof_frictionloss[here.dof].copy()
+    model.dof_frictionloss[here.dof] = 0.0
+
+    def forces(x, v, a, time):
+        moved = zip((x, v, a), displacement(x, v, a))
+        data.qpos[here.at], data.qvel[here.dof], data.qacc[here.dof] = (s + w for s, w in moved)
+        data.time = time
+        mujoco.mj_inverse(model, data)
+        return data.qfrc_inverse
+
+    def pushed(x, v, a, time):
+        # acceleration of the joints without drive
+        data.qacc[free] = 0.0
+        force = forces(x, v, a, time)[free].copy()
+        mass, one = np.zeros((len(free), len(free))), np.zeros(model.nv)
+        for k, dof in enumerate(free):
+            column = np.zeros(model.nv)
+            one[:], one[dof] = 0.0, 1.0
+            mujoco.mj_mulM(model, data, column, one)
+            mass[k] = column[free]
+        return -np.linalg.solve(mass, force)
+
+    def rest(i):
+        data.qvel[free] = 0.0
+        for _ in range(5000):
+            data.qvel[free] = 0.98 * (data.qvel[free] + substep * pushed(q[i], dq[i], ddq[i], 0.0))
+            data.qpos[at] += substep * data.qvel[free]
+
+    try:
+        count = max(int(np.ceil(dt / substep)), 1)
+        if len(free):
+            rest(0)
+            # through the first two seconds backwards with more damping, so that nothing swings from the start
+            data.qvel[free] = 0.0
+            for i in range(min(int(2.0 / dt), len(q) - 1), 0, -1):
+                for s in range(count):
+                    w = s / count
+                    state = [(1 - w) * x[i] + w * x[i - 1] for x in (q, -dq, ddq)]
+                    data.qvel[free] *= 1.0 - min(60.0 * dt / count, 0.5)
+                    data.qvel[free] += dt / count * pushed(*state, 0.0)
+                    data.qpos[at] += dt / count * data.qvel[free]
+            data.qvel[free] *= -1.0
+        for i in range(len(q)):
+            if len(free):
+                data.qacc[free] = pushed(q[i], dq[i], ddq[i], i * dt)
+            tau[i] = forces(q[i], dq[i], ddq[i], i * dt)[here.dof]
+            for s in range(count if len(free) and i + 1 < len(q) else 0):
+                w = s / count
+                state = [(1 - w) * x[i] + w * x[i + 1] for x in (q, dq, ddq)]
+                data.qvel[free] += dt / count * pushed(*state, (i + w) * dt)
+                data.qpos[at] += dt / count * data.qvel[free]
+    finally:
+        mujoco.set_mjcb_passive(previous)
+        model.opt.disableflags = flags
+        model.dof_frictionloss[here.dof] = here.loss
+    tau, times = reported(tau), dt * np.arange(len(q))
+    for j, seconds in DELAYED:
+        tau[:, j] = np.interp(times - seconds, times, tau[:, j])
+    return tau

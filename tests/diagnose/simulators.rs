@@ -1,0 +1,96 @@
+//! The files of a diagnosis in MuJoCo: logs of MuJoCo machines that hide one effect each, in formulas of their own
+//! (`every_effect.py`), are diagnosed; what was written is loaded again. `PYTHON` names the interpreter, `python3`
+//! otherwise; without MuJoCo, NumPy and SciPy the tests say so and are skipped.
+
+use excite::diagnose::{Settings, diagnose};
+use excite::export::{self, Model};
+use excite::log::Experiment;
+use rayon::prelude::*;
+use std::path::Path;
+use std::process::Command;
+
+/// Share of the energy of the gap that may be left on a record that was not fitted.
+const LEFT: f64 = 0.1;
+
+fn python() -> Option<String> {
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+    let found = Command::new(&python)
+        .args(["-c", "import mujoco, numpy, scipy"])
+        .output();
+    match found.is_ok_and(|o| o.status.success()) {
+        true => Some(python),
+        false => {
+            println!("skipped: {python} has no mujoco, numpy or scipy");
+            None
+        }
+    }
+}
+
+fn script(python: &str, what: &str, folder: &Path) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/diagnose/every_effect.py");
+    let out = Command::new(python)
+        .arg(path)
+        .arg(what)
+        .arg(folder)
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{error}");
+    String::from_utf8(out.stdout).unwrap()
+}
+
+fn diagnosed(folder: &Path) {
+    let experiment = Experiment::read(folder.join("experiment.toml")).unwrap();
+    let settings = Settings {
+        next: false,
+        ..Settings::default()
+    };
+    let found = diagnose(&experiment, &settings, &|_| {}).unwrap();
+    let out = folder.join("out");
+    std::fs::create_dir(&out).unwrap();
+    let model = Model {
+        plant: &experiment.plant,
+        robot: &found.improved.robot,
+        remarks: &found.improved.remarks,
+    };
+    for (name, text) in export::write(&model) {
+        std::fs::write(out.join(name), text.unwrap()).unwrap();
+    }
+    let names: Vec<String> = found
+        .improved
+        .remarks
+        .iter()
+        .zip(&found.improved.in_mujoco)
+        .map(|(r, files)| format!("{} on {} ({files})", r.effect, r.place))
+        .collect();
+    println!(
+        "{}: {}",
+        folder.file_name().unwrap().to_string_lossy(),
+        names.join("; ")
+    );
+}
+
+#[test]
+fn every_effect_in_mujoco() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    script(&python, "make", folder.path());
+    let cases: Vec<_> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    assert!(cases.len() >= 25);
+    cases.par_iter().for_each(|case| diagnosed(case));
+    let measured = script(&python, "measure", folder.path());
+    print!("{measured}");
+    let mut worse = Vec::new();
+    for line in measured.lines() {
+        let (name, left) = line.split_once(' ').unwrap();
+        if left.parse::<f64>().unwrap() > LEFT {
+            worse.push(line.to_string());
+        }
+        assert!(cases.iter().any(|c| c.ends_with(name)));
+    }
+    assert_eq!(measured.lines().count(), cases.len());
+    assert!(worse.is_empty(), "{worse:?}");
+}
