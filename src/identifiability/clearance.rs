@@ -61,7 +61,8 @@ impl Clearances {
                 .collect();
             poses(plant.robot(), &plant.posture(&x)?, &mut at);
             // the faces of a [[keep_in]] have no margin and are no volumes
-            let all = scene.pairs.iter().filter(|p| p.margin == scene.margin);
+            let face = |margin: f64| margin == 0.0 && scene.margin > 0.0;
+            let all = scene.pairs.iter().filter(|p| !face(p.margin));
             let all = all.map(|p| scene.separation(p, &at).distance);
             least.push(all.fold(f64::INFINITY, f64::min));
         }

@@ -694,6 +694,37 @@ fn loading_tells_files_bundled_names_and_nothing_apart() {
     );
 }
 
+/// What stands around the robot is in the file that is written, whoever wrote the first one.
+#[test]
+fn the_template_keeps_the_surroundings() {
+    let text = "[collision]\nfloor = true\nmargin = 0.01\nignore = [[\"forearm_link\", \"table\"]]\n\
+        [[obstacle]]\nname = \"table\"\nkind = \"plane\"\nnormal = [0, 0, 1]\noffset = -0.123456789\n\
+        [[obstacle]]\nname = \"post\"\nkind = \"capsule\"\nfrom = [1, 0, 0]\nto = [1, 0, 2.00001]\nradius = 0.05\n\
+        [[obstacle]]\nname = \"bin\"\nkind = \"box\"\nsize = [0.3, 0.2, 0.1]\npose = [0, 1, 0.5, 0.1, 0.2, 0.3]\n\
+        [[keep_in]]\nframe = \"wrist_3_link\"\nlow = [-inf, -1, 0.1]\nhigh = [inf, 1, 2]\n";
+    let urdf = arm(|t| t);
+    let last = Robot::from_urdf_str(&urdf, "arm.urdf").unwrap();
+    let [first, tip] = [0, last.bodies.len() - 1].map(|b| last.bodies[b].name.clone());
+    let text = text
+        .replace("forearm_link", &first)
+        .replace("wrist_3_link", &tip);
+    let robot =
+        Robot::from_toml_str(&format!("urdf = \"arm.urdf\"\n{text}"), &urdf, "a.toml").unwrap();
+    let template = robot.to_toml_template("arm.urdf");
+    let again = Robot::from_toml_str(&template, &urdf, "b.toml").unwrap();
+    let (a, b) = (&robot.geometry, &again.geometry);
+    assert_eq!(a.keep_in, b.keep_in, "{template}");
+    assert_eq!(a.ignore, b.ignore);
+    assert_eq!([a.floor, Some(true)], [b.floor, Some(true)]);
+    assert_eq!(a.obstacles.len(), b.obstacles.len());
+    for (x, y) in a.obstacles.iter().zip(&b.obstacles) {
+        assert_eq!(x.name(), y.name());
+        // angles go through a rotation and back
+        let round = |o| format!("{o:.12?}");
+        assert_eq!(round(x), round(y));
+    }
+}
+
 #[test]
 fn the_template_gives_the_same_robot() {
     let warned = arm(|t| {

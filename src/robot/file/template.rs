@@ -1,5 +1,6 @@
 //! The commented `robot.toml` of `excite new`.
 
+use crate::robot::geometry::Obstacle;
 use crate::robot::{JointTerm, Motion, Prior, Robot, VelocityByPosition};
 use crate::solid::Shape;
 use nalgebra::{Rotation3, Vector3};
@@ -194,11 +195,14 @@ fn tool(robot: &Robot, out: &mut String) {
     }
 }
 
+/// Steps a metre to which fitted volumes are written.
+const STEPS: f64 = 1e4;
+
 /// `[collision]` and the volumes of the links, in link frames, a tenth of a millimetre larger than fitted.
 fn surroundings(robot: &Robot, out: &mut String) {
     let quoted = |s: &str| toml::Value::String(s.to_string()).to_string();
     let geometry = &robot.geometry;
-    if geometry.is_empty() {
+    if geometry.is_empty() && geometry.obstacles.is_empty() {
         return;
     }
     out.push_str(
@@ -230,12 +234,12 @@ fn surroundings(robot: &Robot, out: &mut String) {
         "ignore = [{}]     # pairs of links that are not looked at",
         pairs.join(", ")
     );
-    let three = |v: &Vector3<f64>| {
-        // no minus before a zero
-        let [x, y, z] = [v.x, v.y, v.z].map(|x| (1e4 * x).round() / 1e4 + 0.0);
-        format!("[{x:?}, {y:?}, {z:?}]")
-    };
-    let length = |x: f64| (1e4 * x).ceil() / 1e4 + 1e-4;
+    if let Some(check) = geometry.check {
+        let _ = writeln!(
+            out,
+            "check = {check}     # whether collisions are looked at"
+        );
+    }
     for volume in &geometry.volumes().links {
         let link = &geometry.links[volume.link];
         if geometry.volumes().unseen.contains(&volume.link) {
@@ -249,33 +253,87 @@ fn surroundings(robot: &Robot, out: &mut String) {
         let name = quoted(&link.name);
         for shape in &volume.shapes {
             let _ = writeln!(out, "\n[[volume]]\nlink = {name}");
-            let _ = match shape.moved(&link.pose.inverse()) {
-                Shape::Sphere { centre, radius } => writeln!(
-                    out,
-                    "kind = \"sphere\"\ncentre = {}\nradius = {:.4}",
-                    three(&centre),
-                    length(radius)
-                ),
-                Shape::Capsule { from, to, radius } => writeln!(
-                    out,
-                    "kind = \"capsule\"\nfrom = {}\nto = {}\nradius = {:.4}",
-                    three(&from),
-                    three(&to),
-                    length(radius)
-                ),
-                Shape::Box { pose, half } => {
-                    let (r, p, y) = Rotation3::from_matrix_unchecked(pose.rotation).euler_angles();
-                    let at = pose.position;
-                    writeln!(
-                        out,
-                        "kind = \"box\"\nsize = {}\npose = [{:.5}, {:.5}, {:.5}, {r:.6}, {p:.6}, {y:.6}]",
-                        three(&half.map(|h| length(2.0 * h))),
-                        at.x,
-                        at.y,
-                        at.z
-                    )
-                }
-            };
+            shape_keys(&shape.moved(&link.pose.inverse()), Some(STEPS), out);
         }
     }
+    for o in &geometry.obstacles {
+        let _ = writeln!(out, "\n[[obstacle]]\nname = {}", quoted(o.name()));
+        match o {
+            Obstacle::Plane { normal, offset, .. } => {
+                let _ = writeln!(
+                    out,
+                    "kind = \"plane\"\nnormal = {}\noffset = {offset:?}",
+                    three(normal, None)
+                );
+            }
+            Obstacle::Solid { shape, .. } => shape_keys(shape, None, out),
+        }
+    }
+    for k in &geometry.keep_in {
+        let corner = |v: &Vector3<f64>| {
+            // infinite where there is no bound, which TOML writes the same
+            format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+        };
+        let _ = writeln!(
+            out,
+            "\n[[keep_in]]\nframe = {}\nlow = {}\nhigh = {}",
+            quoted(&k.frame),
+            corner(&k.low),
+            corner(&k.high)
+        );
+    }
+}
+
+/// Three numbers, to whole steps where there are steps.
+fn three(v: &Vector3<f64>, step: Option<f64>) -> String {
+    // no minus before a zero
+    let [x, y, z] = [v.x, v.y, v.z].map(|x| step.map_or(x, |s| (x * s).round() / s) + 0.0);
+    format!("[{x:?}, {y:?}, {z:?}]")
+}
+
+/// Kind and dimensions of a volume. With a `step`, steps a metre, its lengths are whole ones, and one larger than they were.
+fn shape_keys(shape: &Shape, step: Option<f64>, out: &mut String) {
+    let length = |x: f64| match step {
+        Some(s) => ((x * s).ceil() + 1.0) / s,
+        None => x,
+    };
+    let three = |v: &Vector3<f64>| three(v, step);
+    // writing to a String cannot fail
+    let _ = match shape {
+        Shape::Sphere { centre, radius } => writeln!(
+            out,
+            "kind = \"sphere\"\ncentre = {}\nradius = {:?}",
+            three(centre),
+            length(*radius)
+        ),
+        Shape::Capsule { from, to, radius } => writeln!(
+            out,
+            "kind = \"capsule\"\nfrom = {}\nto = {}\nradius = {:?}",
+            three(from),
+            three(to),
+            length(*radius)
+        ),
+        Shape::Box { pose, half } => {
+            let (r, p, y) = Rotation3::from_matrix_unchecked(pose.rotation).euler_angles();
+            let size = half.map(|h| length(2.0 * h));
+            let size = format!("[{:?}, {:?}, {:?}]", size.x, size.y, size.z);
+            let (at, turn) = match step {
+                Some(_) => (
+                    format!(
+                        "{:.5}, {:.5}, {:.5}",
+                        pose.position.x, pose.position.y, pose.position.z
+                    ),
+                    format!("{r:.6}, {p:.6}, {y:.6}"),
+                ),
+                None => (
+                    format!(
+                        "{:?}, {:?}, {:?}",
+                        pose.position.x, pose.position.y, pose.position.z
+                    ),
+                    format!("{r:?}, {p:?}, {y:?}"),
+                ),
+            };
+            writeln!(out, "kind = \"box\"\nsize = {size}\npose = [{at}, {turn}]")
+        }
+    };
 }
