@@ -167,6 +167,8 @@ warning_kinds! {
     Resampled = "resampled",
     /// Numbers look as if they had another unit, sign or side of the gear.
     UnitSuspect = "unit_suspect",
+    /// What a log is stated to be does not fit the robot.
+    LogSuspect = "log_suspect",
     /// A joint does not move in a log.
     JointNotMoving = "joint_not_moving",
     /// The stated period does not hold, or is too short or too long for the record.

@@ -44,6 +44,10 @@ pub struct Args {
     /// Give the estimate as it is, even if no rigid body could have it
     #[arg(long)]
     unconstrained: bool,
+    /// Go on where the log fits the robot only if it is read otherwise than stated: another unit or sign, exchanged
+    /// legs, chambers or records
+    #[arg(long)]
+    unchecked: bool,
     /// Mean speed of the actuators at which samples begin to count in the two steps, rad/s or m/s
     /// [default: a fifth of its root mean square]
     #[arg(long, value_name = "SPEED")]
@@ -150,6 +154,7 @@ pub fn run(args: Args) -> Result<()> {
         },
         weighted: !args.unweighted,
         consistent: !args.unconstrained,
+        checked: !args.unchecked,
         standstill: args.standstill,
         atmosphere: args.atmosphere,
         ..Settings::default()
@@ -189,6 +194,16 @@ fn summary(found: &Identified, files: &[PathBuf]) -> String {
     let mut out = String::new();
     let mut line = |name: &str, body: &load::LoadBody| {
         let (v, s) = (body.values(), body.stds());
+        let sure = load::json::determined(body);
+        if !sure[0] {
+            let _ = writeln!(
+                out,
+                "{name}: mass not determined ({:.3} ± {:.3} kg at 95 %)",
+                v[0],
+                1.96 * s[0]
+            );
+            return;
+        }
         let _ = writeln!(
             out,
             "{name}: mass {:.4} ± {:.4} kg (95 %)",
@@ -206,10 +221,9 @@ fn summary(found: &Identified, files: &[PathBuf]) -> String {
             1.96e3 * s[3]
         );
         if body.known.iter().all(|k| *k) {
-            let sure = load::json::determined(body);
             let names = ["xx", "xy", "xz", "yy", "yz", "zz"];
             let entry = |k: usize| match sure[4 + k] {
-                true => format!("{} {:.4}", names[k], v[4 + k]),
+                true => format!("{} {:.4} ± {:.4}", names[k], v[4 + k], 1.96 * s[4 + k]),
                 false => format!("{} not determined", names[k]),
             };
             let all: Vec<String> = (0..6).map(entry).collect();

@@ -81,11 +81,30 @@ pub fn json(found: &Identified) -> Value {
         out["methods"]["two_step"] = b;
     }
     out["residual_spread"] = json!(one.spreads);
+    out["zeros"] = found
+        .joints
+        .iter()
+        .zip(&one.zeros)
+        .map(|(joint, zero)| {
+            let mut z = json!(zero);
+            z["joint"] = json!(joint);
+            z
+        })
+        .collect();
     out["records"] = one
         .records
         .iter()
         .map(|r| {
-            json!({ "name": r.name, "loaded": r.loaded, "friction": r.friction,
+            let friction: Vec<Value> = r
+                .friction
+                .iter()
+                .map(|f| {
+                    let mut v = json!(f);
+                    v["stribeck_determined"] = json!(f.stribeck_determined());
+                    v
+                })
+                .collect();
+            json!({ "name": r.name, "loaded": r.loaded, "friction": friction,
                     "residuals": r.residuals })
         })
         .collect();

@@ -42,6 +42,7 @@ pub(crate) mod one_step;
 pub mod page;
 pub(crate) mod records;
 pub(crate) mod settings;
+mod suspicion;
 pub(crate) mod system;
 #[doc(hidden)]
 pub mod two_step;
@@ -77,6 +78,9 @@ use crate::plant::Plant;
 /// No record with an unknown load; signals that cannot be used; a motion that does not excite the
 /// load.
 pub fn identify(experiment: &Experiment, settings: &Settings) -> Result<Identified> {
+    if settings.checked {
+        suspicion::raw(experiment, settings.atmosphere)?;
+    }
     let records = records::prepared(experiment, settings)?;
     let mut found = from_records(&experiment.plant, records, settings)?;
     found.warnings.splice(0..0, experiment.warnings());
@@ -114,6 +118,8 @@ pub fn from_records(
         Some(gains) => {
             let plain = Settings {
                 consistent: false,
+                // looked at above
+                checked: false,
                 ..settings.clone()
             };
             let estimate = |records: &[Loaded]| -> Result<[f64; 10]> {

@@ -3,15 +3,20 @@
 mod fitted;
 mod reweight;
 mod solver;
+mod spectrum;
 mod ten;
+mod zeros;
 
-pub use fitted::Fitted;
 pub(super) use fitted::rms;
+pub use fitted::{Fitted, JointFriction};
 pub(super) use solver::Solver;
+pub(super) use spectrum::noise_like;
+pub use zeros::Decision;
 
 use super::body::LoadBody;
 use super::records::Loaded;
 use super::settings::{Parameters, Settings};
+use super::suspicion;
 use super::system::System;
 use super::weight::Spread;
 use crate::error::{Result, Warning, WarningKind};
@@ -31,6 +36,8 @@ pub struct OneStep {
     pub records: Vec<Fitted>,
     /// spread of the residual of each actuator
     pub spreads: Vec<Spread>,
+    /// constant forces of the actuators: shared by the records, drifting or free; empty with a single record
+    pub zeros: Vec<Decision>,
     /// condition number of the weighted columns of the load, scaled to unit length
     pub condition: f64,
     /// parameters of the load that cannot be told, with the reason
@@ -53,11 +60,16 @@ pub fn estimate(
     let used: Vec<&Loaded> = records.iter().filter(|r| !known(r)).collect();
     let empty = used.iter().any(|r| r.payload == Payload::None);
     let system = System::new(plant, tool, &used, empty)?;
+    let suspicions = match settings.checked {
+        true => suspicion::prepared(plant, tool, &system)?,
+        false => Vec::new(),
+    };
     let mut solver = Solver::new(&system, ten::unknowns(&system, settings.parameters)?);
     let noise = reweight::first_noise(plant, &system);
     let (solution, spreads) = reweight::reweighted(&mut solver, &noise, settings)?;
-    let covariance = reweight::covariance(&solver, &solution, &spreads)?;
-    let (mut phi, covariance) = ten::values(&solver, &solution, &covariance);
+    let (mut solution, mut all) = reweight::completed(&mut solver, solution, &spreads, settings)?;
+    let zeros = zeros::decide(&solver, &mut solution, &mut all);
+    let (mut phi, covariance) = ten::values(&solver, &solution, &all);
     let (mut known, mut unknown) = ten::known(&system);
     if settings.parameters == Parameters::MassCom {
         phi = ten::point(&phi).0;
@@ -67,12 +79,24 @@ pub fn estimate(
     let first = system.deviations.len();
     let condition = ten::condition(&solution.r, first, solver.load.len());
     let full = settings.parameters == Parameters::Full;
+    if settings.checked && known[0] {
+        suspicion::negative(phi[0], covariance[(0, 0)].max(0.0).sqrt())?;
+    }
     let load = LoadBody::new(Inertia(phi), covariance, known, settings.consistent && full)?;
     Ok(OneStep {
-        warnings: warnings(&load, full && known.iter().all(|k| *k), &unknown, condition),
-        records: (0..system.parts.len())
-            .map(|p| fitted::fitted(&solver, &solution, &load, p))
+        warnings: suspicions
+            .into_iter()
+            .chain(warnings(
+                &load,
+                full && known.iter().all(|k| *k),
+                &unknown,
+                condition,
+            ))
             .collect(),
+        records: (0..system.parts.len())
+            .map(|p| fitted::fitted(&solver, &solution, &all, &load, p))
+            .collect(),
+        zeros,
         load,
         spreads,
         condition,

@@ -1,5 +1,7 @@
 //! The report of a load.
 
+mod friction;
+
 use super::Identified;
 use super::body::LoadBody;
 use super::controller;
@@ -83,7 +85,10 @@ pub fn html(found: &Identified) -> String {
     sections.push(methods(found));
     sections.push(torques(found));
     sections.push(speeds(found));
-    sections.push(friction(found));
+    if let Some(zeros) = friction::zeros(found) {
+        sections.push(zeros);
+    }
+    sections.push(friction::section(found));
     if let Some(g) = &found.gain {
         let rows: Vec<Vec<Markup>> = (0..g.joints.len())
             .map(|j| {
@@ -349,52 +354,5 @@ fn speeds(found: &Identified) -> Section {
                 ]))
             },
         ),
-    )
-}
-
-fn friction(found: &Identified) -> Section {
-    let mut rows = Vec::new();
-    for r in &found.one_step.records {
-        for (a, f) in r.friction.iter().enumerate() {
-            let range = |v: &[f64]| match v.is_empty() {
-                true => html! { "–" },
-                false => {
-                    let low = v.iter().cloned().fold(f64::INFINITY, f64::min);
-                    let high = v.iter().cloned().fold(f64::NEG_INFINITY, f64::max);
-                    html! { (significant(low, 3)) " … " (significant(high, 3)) }
-                }
-            };
-            rows.push(vec![
-                html! { (r.name) },
-                html! { (found.joints[a]) },
-                html! { (significant(f.coulomb, 3)) },
-                range(&f.coulomb_periods),
-                html! { (significant(f.viscous, 3)) },
-                html! { (significant(f.offset, 3)) },
-                match (f.stribeck, f.stribeck_velocity) {
-                    (Some(force), Some(v)) => {
-                        html! { (significant(force, 3)) " at " (significant(v, 2)) }
-                    }
-                    _ => html! { "–" },
-                },
-                html! { (significant(r.residuals[a].rms, 3)) },
-                html! { (percent(r.residuals[a].relative)) },
-            ]);
-        }
-    }
-    let head = [
-        "record",
-        "joint",
-        "Coulomb",
-        "Coulomb, period by period",
-        "viscous",
-        "offset",
-        "Stribeck, at speed",
-        "residual",
-        "of the torque",
-    ];
-    Section::new(
-        "Friction, refitted for every record",
-        html::details("Friction and residuals", html::table(&head, &[], &rows)),
     )
 }

@@ -13,6 +13,8 @@ pub struct Loaded {
     pub record: Prepared,
     /// load
     pub payload: Payload,
+    /// the torques as they were if chambers a and b were exchanged, unfiltered; where they come from pressures
+    pub exchanged: Option<Vec<f64>>,
 }
 
 /// The records of an experiment with their signals prepared.
@@ -23,13 +25,32 @@ pub fn prepared(experiment: &Experiment, settings: &Settings) -> Result<Vec<Load
     let plant = &experiment.plant;
     let one = |record: &Record| {
         let pressed = pressure_forces(record, plant, settings.atmosphere)?;
+        let exchanged = match (&pressed, settings.checked && plant.closed()) {
+            (Some(_), true) => exchanged(record, plant, settings)?,
+            _ => None,
+        };
         let record = pressed.as_ref().unwrap_or(record);
         Ok(Loaded {
             record: Prepared::new(record, plant, &settings.signals)?,
             payload: record.payload,
+            exchanged,
         })
     };
     experiment.records.iter().map(one).collect()
+}
+
+/// Torques of a record whose chambers are exchanged.
+fn exchanged(record: &Record, plant: &Plant, settings: &Settings) -> Result<Option<Vec<f64>>> {
+    let turned = Record {
+        pressures: (record.pressures.clone()).map(|[a, b]| [b, a]),
+        ..record.clone()
+    };
+    let Some(forces) = pressure_forces(&turned, plant, settings.atmosphere)? else {
+        return Ok(None);
+    };
+    Ok(Some(
+        Prepared::new(&forces, plant, &settings.signals)?.torque,
+    ))
 }
 
 /// Refuses records without torques, and experiments without an unknown load.

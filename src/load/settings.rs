@@ -38,6 +38,8 @@ pub struct Settings {
     /// mean speed of the actuators below which the two-step estimator gives no weight, rad/s or
     /// m/s; `None`: a fifth of its root mean square
     pub standstill: Option<f64>,
+    /// whether a log that fits the robot only if it is read otherwise than stated is refused
+    pub checked: bool,
     /// pressure outside of the cylinders, Pa; 0 where the logged pressures are relative to it
     pub atmosphere: f64,
     /// where the flange is in the frame of the body that carries the load: x y z, m, roll pitch yaw, rad
@@ -54,6 +56,7 @@ impl Default for Settings {
             weighted: true,
             consistent: true,
             standstill: None,
+            checked: true,
             atmosphere: 101_325.0,
             flange: [0.0; 6],
             signals: signals::Settings::default(),

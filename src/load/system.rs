@@ -34,7 +34,9 @@ pub struct Part {
     pub torque: Vec<f64>,
     /// measured torque minus nominal model without friction of the actuators
     pub y: Vec<f64>,
-    /// the same of every period, where there are periods
+    /// measured torque with the chambers exchanged, where it comes from pressures
+    pub exchanged: Option<Vec<f64>>,
+    /// the same as `y` of every period, where there are periods
     pub periods: Vec<Vec<f64>>,
     /// ten columns of the body that carries the load
     pub tool: Mat<f64>,
@@ -50,13 +52,23 @@ pub struct Part {
 impl Part {
     /// Stribeck factor `exp(−(v/v_s)²) sign(v)` of an actuator, filtered like everything else.
     pub fn stribeck(&self, a: usize, speed: f64) -> Vec<f64> {
+        self.of_speed(a, |v| (-(v / speed).powi(2)).exp() * v.signum())
+    }
+
+    /// Its derivative with respect to `v_s`: `2 v²/v_s³ exp(−(v/v_s)²) sign(v)`.
+    pub fn stribeck_slope(&self, a: usize, speed: f64) -> Vec<f64> {
+        self.of_speed(a, |v| {
+            let u = v / speed;
+            2.0 * u * u / speed * (-u * u).exp() * v.signum()
+        })
+    }
+
+    /// A function of the speed of an actuator, zero at rest, filtered like everything else.
+    fn of_speed(&self, a: usize, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let n = self.raw_speed.len() / (self.y.len() / self.count.max(1)).max(1);
         let raw: Vec<f64> = self.raw_speed[a * n..(a + 1) * n]
             .iter()
-            .map(|v| match *v == 0.0 {
-                true => 0.0,
-                false => (-(v / speed).powi(2)).exp() * v.signum(),
-            })
+            .map(|v| if *v == 0.0 { 0.0 } else { f(*v) })
             .collect();
         self.filter.apply(&raw)
     }
@@ -97,7 +109,7 @@ fn deviation_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<(Mat<f64
 }
 
 /// Nominal torque without viscous, Coulomb and constant terms of the actuators.
-fn rigid_torque(plant: &Plant, x: &Samples, moved: &Samples) -> Result<Vec<f64>> {
+pub(super) fn rigid_torque(plant: &Plant, x: &Samples, moved: &Samples) -> Result<Vec<f64>> {
     let mut tau = plant.nominal_torque(x)?;
     for (a, joint) in plant.actuators().iter().enumerate() {
         for term in FRICTION {
@@ -192,6 +204,7 @@ fn part(plant: &Plant, tool: usize, loaded: &Loaded, kept: &[usize]) -> Result<P
         speed,
         torque: record.filtered(&record.torque),
         y: explain(&record.torque),
+        exchanged: loaded.exchanged.as_ref().map(|t| record.filtered(t)),
         periods: match &record.periods {
             Some(p) => p.torque.iter().map(|t| explain(t)).collect(),
             None => Vec::new(),

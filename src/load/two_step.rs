@@ -22,6 +22,9 @@
 //! carry the centre of mass; and an error of `c` goes into the tensor. Therefore `one_step`
 //! is the default.
 
+mod draws;
+
+use self::draws::Chain;
 use super::body::{LoadBody, Quantities, difference, from_quantities};
 use super::one_step::{Solver, rms};
 use super::records::Loaded;
@@ -36,7 +39,7 @@ use crate::plant::Plant;
 use crate::robot::Inertia;
 use crate::robot::inertia::skew;
 use faer::Mat;
-use faer::linalg::solvers::{DenseSolveCore, SolveLstsq};
+use faer::linalg::solvers::SolveLstsq;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 /// Motion of a platform and the force on it, in one sample.
@@ -84,12 +87,6 @@ impl PlatformSample {
 pub struct Total {
     /// mass, centre of mass, tensor about the centre of mass
     pub values: Quantities,
-    /// covariance of `[1/m, r]`
-    #[serde(serialize_with = "crate::output::rows")]
-    pub first: Mat<f64>,
-    /// covariance of the tensor
-    #[serde(serialize_with = "crate::output::rows")]
-    pub second: Mat<f64>,
     /// root mean square of the residuals: m/s² and N m
     pub residuals: [f64; 2],
 }
@@ -104,8 +101,8 @@ fn spread(w: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
     ])
 }
 
-/// Weighted least squares; the solution, its covariance and the root mean square of the residual.
-fn solve(a: Mat<f64>, y: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>, f64)> {
+/// Weighted least squares; the solution and the root mean square of the residual.
+fn solve(a: Mat<f64>, y: Mat<f64>) -> Result<(Vec<f64>, f64)> {
     let n = a.ncols();
     let qr = a.qr();
     let x = qr.solve_lstsq(&y);
@@ -121,12 +118,7 @@ fn solve(a: Mat<f64>, y: Mat<f64>) -> Result<(Vec<f64>, Mat<f64>, f64)> {
         let fit: f64 = (0..n).map(|c| a[(r, c)] * x[c]).sum();
         square += (y[(r, 0)] - fit).powi(2);
     }
-    let variance = square / (a.nrows() - n).max(1) as f64;
-    let r = qr.thin_R();
-    let information = r.transpose() * r;
-    let inverse = information.partial_piv_lu().inverse();
-    let covariance = Mat::from_fn(n, n, |i, j| variance * inverse[(i, j)]);
-    Ok((x, covariance, (square / a.nrows() as f64).sqrt()))
+    Ok((x, (square / a.nrows() as f64).sqrt()))
 }
 
 /// Both steps; `gravity` in base axes, m/s².
@@ -152,7 +144,7 @@ pub fn total(samples: &[PlatformSample], gravity: &Vector3<f64>) -> Result<Total
             y[(3 * i + k, 0)] = w * right[k];
         }
     }
-    let (first, cov1, rms1) = solve(a, y)?;
+    let (first, rms1) = solve(a, y)?;
     if first[0] <= 0.0 {
         return Err(Error::Infeasible(format!(
             "step 1 gives a mass of 1/{:.3e} kg: the forces are not those of legs that carry the \
@@ -173,15 +165,13 @@ pub fn total(samples: &[PlatformSample], gravity: &Vector3<f64>) -> Result<Total
             y[(3 * i + k, 0)] = w * right[k];
         }
     }
-    let (j, cov2, rms2) = solve(a, y)?;
+    let (j, rms2) = solve(a, y)?;
     let mut values = [0.0; 10];
     values[0] = 1.0 / first[0];
     values[1..4].copy_from_slice(&first[1..]);
     values[4..].copy_from_slice(&j);
     Ok(Total {
         values,
-        first: cov1,
-        second: cov2,
         residuals: [rms1, rms2],
     })
 }
@@ -230,23 +220,19 @@ pub fn estimate(
             Payload::None => &mut empty,
             Payload::Known { .. } => continue,
         };
-        let (samples, v0) = platform_samples(plant, mechanism, tool, loaded, settings)?;
+        let record = to.len() as u64 + 1000 * u64::from(loaded.payload == Payload::None);
+        let (chain, v0) = chain(plant, mechanism, tool, loaded, settings, record)?;
         standstill = v0;
-        to.extend(samples);
+        to.push(chain);
     }
-    let all = total(&full, &gravity)?;
-    let (platform, empty_covariance) = match empty.is_empty() {
-        true => (mechanism.robot.bodies[tool].inertia, None),
-        false => {
-            let t = total(&empty, &gravity)?;
-            (from_quantities(&t.values), Some(covariance(&t)))
-        }
+    let (all, unloaded) = draws::totals(&full, &empty, &gravity)?;
+    let platform = match unloaded {
+        None => mechanism.robot.bodies[tool].inertia,
+        Some(t) => from_quantities(&t.values),
     };
     let inertia = difference(&from_quantities(&all.values), &platform);
-    let mut c = covariance(&all);
-    if let Some(other) = empty_covariance {
-        c += other;
-    }
+    let c = draws::covariance(&full, &empty, &gravity, &inertia.0, &platform.0);
+    let full: Vec<PlatformSample> = full.into_iter().flat_map(|c| c.samples).collect();
     let load = LoadBody::new(inertia, c, [true; 10], settings.consistent)?;
     let mean = full.iter().map(|s| s.force.norm_squared()).sum::<f64>() / full.len() as f64;
     // residual of Newton's equation, as a force
@@ -260,70 +246,30 @@ pub fn estimate(
     })
 }
 
-/// Covariance of the ten parameters about `O`, to first order from those of the two steps.
-fn covariance(t: &Total) -> Mat<f64> {
-    let at = |v: &[f64; 10]| -> [f64; 10] {
-        let mut q = *v;
-        q[0] = 1.0 / v[0];
-        from_quantities(&q).0
-    };
-    let mut centre = t.values;
-    centre[0] = 1.0 / t.values[0];
-    let columns: Vec<[f64; 10]> = (0..10)
-        .map(|k| {
-            let h = 1e-6 * centre[k].abs().max(1e-3);
-            let step = |s: f64| {
-                let mut v = centre;
-                v[k] += s * h;
-                at(&v)
-            };
-            let (up, down) = (step(1.0), step(-1.0));
-            std::array::from_fn(|i| (up[i] - down[i]) / (2.0 * h))
-        })
-        .collect();
-    let inner = |a: usize, b: usize| match (a < 4, b < 4) {
-        (true, true) => t.first[(a, b)],
-        (false, false) => t.second[(a - 4, b - 4)],
-        _ => 0.0,
-    };
-    Mat::from_fn(10, 10, |i, j| {
-        let mut sum = 0.0;
-        for a in 0..10 {
-            for b in 0..10 {
-                sum += columns[a][i] * inner(a, b) * columns[b][j];
-            }
-        }
-        sum
-    })
-}
-
-/// Motion of the platform and the wrench on it, friction and legs taken off, with the weights.
-fn platform_samples(
+/// Motion of the platform and the wrench on it, friction and legs taken off, with the weights; and what other forces
+/// would make of it.
+fn chain(
     plant: &Plant,
     mechanism: &Mechanism,
     tool: usize,
     loaded: &Loaded,
     settings: &Settings,
-) -> Result<(Vec<PlatformSample>, f64)> {
+    record: u64,
+) -> Result<(Chain, f64)> {
     // friction: Coulomb and viscous beside all that the platform may carry, unweighted
     let as_loaded = Loaded {
         record: loaded.record.clone(),
         payload: Payload::Unknown,
+        exchanged: None,
     };
     let system = System::new(plant, tool, &[&as_loaded], false)?;
     let solver = Solver::new(&system, system.base.kept.clone());
     let solution = solver.solve(&|_, _| 1.0)?;
     let part = &system.parts[0];
     let (n, na) = (part.count, system.actuators);
-    let mut force = part.torque.clone();
-    for a in 0..na {
-        let f = solver.friction_of(&solution, 0, a);
-        for i in a * n..(a + 1) * n {
-            for k in 0..3 {
-                force[i] -= f[k] * part.friction[k][i];
-            }
-        }
-    }
+    let force: Vec<f64> = (0..na * n)
+        .map(|i| part.torque[i] - solver.friction_at(&solution.values, 0, i))
+        .collect();
     let speeds: Vec<f64> = (0..n)
         .map(|i| (0..na).map(|a| part.speed[a * n + i].abs()).sum::<f64>() / na as f64)
         .collect();
@@ -335,8 +281,17 @@ fn platform_samples(
             false => 1.0,
         })
         .collect();
+    let at = |force: &[f64]| wrenches(mechanism, tool, &part.motion, force, &weights);
+    let mut none = vec![0.0; na * n];
+    let nothing = at(&none)?;
+    let mut unit = Vec::with_capacity(na);
+    for a in 0..na {
+        none[a * n..(a + 1) * n].fill(1.0);
+        unit.push(at(&none)?);
+        none[a * n..(a + 1) * n].fill(0.0);
+    }
     Ok((
-        wrenches(mechanism, tool, &part.motion, &force, &weights)?,
+        Chain::new(at(&force)?, &nothing, &unit, &solver, record)?,
         v0,
     ))
 }

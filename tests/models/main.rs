@@ -6,3 +6,4 @@ mod common;
 mod h4_identification;
 mod identify;
 mod load;
+mod wrong_logs;

@@ -3,6 +3,7 @@
 use super::solver::{Solution, Solver};
 use crate::load::body::LoadBody;
 use crate::load::system::Part;
+use faer::Mat;
 use nalgebra::Vector3;
 
 /// Friction of one actuator in one record.
@@ -18,10 +19,32 @@ pub struct JointFriction {
     pub stribeck: Option<f64>,
     /// speed at which that has fallen to `1/e`, rad/s or m/s
     pub stribeck_velocity: Option<f64>,
+    /// standard deviation of `coulomb`
+    pub coulomb_std: f64,
+    /// of `viscous`
+    pub viscous_std: f64,
+    /// of `offset`
+    pub offset_std: f64,
+    /// of `stribeck`
+    pub stribeck_std: Option<f64>,
+    /// of `stribeck_velocity`
+    pub stribeck_velocity_std: Option<f64>,
     /// Coulomb friction of every period, where the motion repeats
     pub coulomb_periods: Vec<f64>,
     /// viscous friction of every period
     pub viscous_periods: Vec<f64>,
+}
+
+impl JointFriction {
+    /// Whether Stribeck force and speed are known to half of themselves, at 95 %.
+    pub fn stribeck_determined(&self) -> bool {
+        let known = |value: Option<f64>, std: Option<f64>| match (value, std) {
+            (Some(v), Some(s)) => 1.96 * s <= 0.5 * v.abs(),
+            _ => false,
+        };
+        known(self.stribeck, self.stribeck_std)
+            && known(self.stribeck_velocity, self.stribeck_velocity_std)
+    }
 }
 
 /// What is left of one actuator's torque in one record.
@@ -62,7 +85,13 @@ pub fn rms(x: &[f64]) -> f64 {
 }
 
 /// A record after the fit, with the load as identified.
-pub fn fitted(solver: &Solver, s: &Solution, load: &LoadBody, p: usize) -> Fitted {
+pub fn fitted(
+    solver: &Solver,
+    s: &Solution,
+    covariance: &Mat<f64>,
+    load: &LoadBody,
+    p: usize,
+) -> Fitted {
     let system = solver.system;
     let part = &system.parts[p];
     let n = part.count;
@@ -76,6 +105,8 @@ pub fn fitted(solver: &Solver, s: &Solution, load: &LoadBody, p: usize) -> Fitte
     let friction: Vec<JointFriction> = (0..system.actuators)
         .map(|a| {
             let values = solver.friction_of(s, p, a);
+            let stds = solver.friction_stds(covariance, p, a);
+            let speed = s.values[solver.speed(a)];
             for i in a * n..(a + 1) * n {
                 for c in 0..system.deviations.len() {
                     carried[i] -= s.values[c] * part.deviation[(i, c)];
@@ -83,7 +114,7 @@ pub fn fitted(solver: &Solver, s: &Solution, load: &LoadBody, p: usize) -> Fitte
                 for f in 0..3 {
                     carried[i] -= values[f] * part.friction[f][i];
                 }
-                carried[i] -= values[3] * solver.peaks[p][i];
+                carried[i] -= values[3] * solver.peaks[p][i] + speed * solver.slopes[p][i];
             }
             let (mut coulomb, mut viscous) = (Vec::new(), Vec::new());
             for period in &part.periods {
@@ -97,6 +128,11 @@ pub fn fitted(solver: &Solver, s: &Solution, load: &LoadBody, p: usize) -> Fitte
                 offset: values[2],
                 stribeck: solver.speeds[a].map(|_| values[3]),
                 stribeck_velocity: solver.speeds[a],
+                coulomb_std: stds[0],
+                viscous_std: stds[1],
+                offset_std: stds[2],
+                stribeck_std: solver.speeds[a].map(|_| stds[3]),
+                stribeck_velocity_std: solver.speeds[a].map(|_| stds[4]),
                 coulomb_periods: coulomb,
                 viscous_periods: viscous,
             }

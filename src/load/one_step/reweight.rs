@@ -6,10 +6,9 @@ use super::ten::point_mass;
 use crate::error::Result;
 use crate::load::settings::{Parameters, Settings};
 use crate::load::system::{Part, System};
-use crate::load::weight::{Spread, inflation};
+use crate::load::weight::Spread;
 use crate::plant::Plant;
 use faer::Mat;
-use faer::linalg::solvers::DenseSolveCore;
 
 /// Rounds of reweighting.
 const ROUNDS: usize = 10;
@@ -90,32 +89,44 @@ pub fn reweighted(
     Ok((solution, spreads))
 }
 
-/// Covariance of all columns, counting what autocorrelated residuals are worth.
+/// Rounds in which the Stribeck speeds settle.
+const SPEEDS: usize = 4;
+
+/// Largest Stribeck force that a machine ordinarily has, in Coulomb forces: its standard deviation before the records are
+/// seen.
+const STICKING: f64 = 2.0;
+
+/// Solves once more with the Stribeck speeds as unknowns. The covariance of all columns counts them, and what residuals
+/// that are not white are worth.
 ///
 /// # Errors
 /// Signals that are not finite.
-pub fn covariance(solver: &Solver, solution: &Solution, spreads: &[Spread]) -> Result<Mat<f64>> {
+pub fn completed(
+    solver: &mut Solver,
+    first: Solution,
+    spreads: &[Spread],
+    settings: &Settings,
+) -> Result<(Solution, Mat<f64>)> {
     let system = solver.system;
-    let worth: Vec<Vec<f64>> = system
-        .parts
-        .iter()
-        .zip(&solution.residual)
-        .enumerate()
-        .map(|(p, (part, rest))| {
-            (0..system.actuators)
-                .map(|a| {
-                    let whitened: Vec<f64> = (a * part.count..(a + 1) * part.count)
-                        .map(|i| rest[i] / deviation(system, spreads, p, i))
-                        .collect();
-                    inflation(&whitened)
-                })
-                .collect()
-        })
-        .collect();
-    let deflated = solver.solve(&|p, i| {
-        let a = i / system.parts[p].count;
-        deviation(system, spreads, p, i) * worth[p][a].sqrt()
-    })?;
-    let information = deflated.r.transpose() * &deflated.r;
-    Ok(information.partial_piv_lu().inverse())
+    let load = system.deviations.len()..system.deviations.len() + solver.load.len();
+    let mut solution = first;
+    for a in 0..system.actuators {
+        let dry = (0..system.parts.len())
+            .map(|p| solver.friction_of(&solution, p, a)[0].abs())
+            .fold(0.0f64, f64::max);
+        solver.breakaway[a] = STICKING * dry.max(spreads[a].floor);
+    }
+    let deviation = |p, i| deviation(system, spreads, p, i);
+    for round in 0..SPEEDS {
+        if settings.parameters == Parameters::MassCom {
+            point_mass(solver, &solution.values[load.clone()]);
+        }
+        if settings.weighted {
+            solver.linearise(&solution);
+        }
+        if round + 1 < SPEEDS {
+            solution = solver.solve(&deviation)?;
+        }
+    }
+    solver.solve_coloured(&deviation)
 }

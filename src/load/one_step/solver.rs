@@ -1,5 +1,6 @@
 //! Weighted least squares for deviations, load and friction of every record at once.
 
+use super::spectrum;
 use crate::error::{Error, Result};
 use crate::load::system::{Part, System};
 use faer::Mat;
@@ -27,10 +28,17 @@ pub struct Solver<'a> {
     pub speeds: Vec<Option<f64>>,
     /// Stribeck factors, part by part
     pub peaks: Vec<Vec<f64>>,
+    /// what a change of the Stribeck speed does, part by part; zero where that is not an unknown
+    pub slopes: Vec<Vec<f64>>,
+    /// standard deviation of the Stribeck forces of each actuator before the records are seen, N m or N
+    pub breakaway: Vec<f64>,
 }
 
 /// Friction columns of an actuator in a record: Coulomb, viscous, offset, Stribeck.
 const EACH: usize = 4;
+
+/// Largest step of a Stribeck speed, of itself.
+const STRIDE: f64 = 0.3;
 
 impl<'a> Solver<'a> {
     pub fn new(system: &'a System, load: Vec<usize>) -> Self {
@@ -40,17 +48,28 @@ impl<'a> Solver<'a> {
             shift: vec![Vec::new(); system.parts.len()],
             speeds: vec![None; system.actuators],
             peaks: system.parts.iter().map(|p| vec![0.0; p.y.len()]).collect(),
+            slopes: system.parts.iter().map(|p| vec![0.0; p.y.len()]).collect(),
+            breakaway: vec![f64::INFINITY; system.actuators],
         }
     }
 
     fn columns(&self) -> usize {
-        let friction = EACH * self.system.actuators * self.system.parts.len();
-        self.system.deviations.len() + self.load.len() + friction
+        self.speed(self.system.actuators)
     }
 
     /// First friction column of a record.
     fn friction(&self, part: usize) -> usize {
         self.system.deviations.len() + self.load.len() + EACH * self.system.actuators * part
+    }
+
+    /// Column of the constant force of an actuator in a record.
+    pub fn offset(&self, part: usize, a: usize) -> usize {
+        self.friction(part) + EACH * a + 2
+    }
+
+    /// Column of the Stribeck speed of an actuator, which all records share.
+    pub fn speed(&self, a: usize) -> usize {
+        self.friction(self.system.parts.len()) + a
     }
 
     fn row(&self, p: usize, part: &Part, i: usize, to: &mut dyn FnMut(usize, f64)) {
@@ -68,6 +87,7 @@ impl<'a> Solver<'a> {
             to(first + f, column[i]);
         }
         to(first + 3, self.peaks[p][i]);
+        to(self.speed(i / part.count), self.slopes[p][i]);
     }
 
     /// Looks for Stribeck friction in the residuals of every actuator; `sigma` are their standard
@@ -78,12 +98,39 @@ impl<'a> Solver<'a> {
                 self.speeds[a] = speed;
             }
         }
+        self.set_peaks();
+    }
+
+    /// Stribeck factors of the speeds that are set.
+    fn set_peaks(&mut self) {
         for (p, part) in self.system.parts.iter().enumerate() {
             for (a, speed) in self.speeds.iter().enumerate() {
                 let to = &mut self.peaks[p][a * part.count..(a + 1) * part.count];
                 match speed {
                     Some(v) => to.copy_from_slice(&part.stribeck(a, *v)),
                     None => to.fill(0.0),
+                }
+            }
+        }
+    }
+
+    /// Makes the Stribeck speeds unknowns: their columns, about the forces of a solution. What the solution has found of
+    /// them is put into effect first, at most [`STRIDE`] of each.
+    pub fn linearise(&mut self, s: &Solution) {
+        for a in 0..self.system.actuators {
+            let step = s.values[self.speed(a)];
+            if let Some(v) = &mut self.speeds[a] {
+                *v += step.clamp(-STRIDE * *v, STRIDE * *v);
+            }
+        }
+        self.set_peaks();
+        for (p, part) in self.system.parts.iter().enumerate() {
+            for (a, speed) in self.speeds.iter().enumerate() {
+                let Some(speed) = speed else { continue };
+                let force = s.values[self.friction(p) + EACH * a + 3];
+                let to = &mut self.slopes[p][a * part.count..(a + 1) * part.count];
+                for (to, slope) in to.iter_mut().zip(part.stribeck_slope(a, *speed)) {
+                    *to = force * slope;
                 }
             }
         }
@@ -151,6 +198,58 @@ impl<'a> Solver<'a> {
 
     /// Weighted least squares; `deviation(p, i)` is the standard deviation of row `i` of record `p`.
     pub fn solve(&self, deviation: &dyn Fn(usize, usize) -> f64) -> Result<Solution> {
+        Ok(self.solve_with(deviation, false)?.0)
+    }
+
+    /// The same, with the covariance of all columns that counts the power of what is left over frequency (see
+    /// [`spectrum`]): rows that are not white are worth less.
+    ///
+    /// # Errors
+    /// Signals that are not finite.
+    pub fn solve_coloured(
+        &self,
+        deviation: &dyn Fn(usize, usize) -> f64,
+    ) -> Result<(Solution, Mat<f64>)> {
+        let (solution, covariance, _) = self.solve_with(deviation, true)?;
+        Ok((solution, covariance))
+    }
+
+    fn solve_with(
+        &self,
+        deviation: &dyn Fn(usize, usize) -> f64,
+        coloured: bool,
+    ) -> Result<(Solution, Mat<f64>, Vec<Vec<f64>>)> {
+        let (a, y) = self.rows(deviation, coloured);
+        let n = a.ncols();
+        let qr = a.qr();
+        let values: Vec<f64> = {
+            let x = qr.solve_lstsq(&y);
+            (0..n).map(|c| x[(c, 0)]).collect()
+        };
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(Error::Infeasible(
+                "the least-squares problem of the load has no finite solution: the logs hold \
+                 numbers that are not finite, or the robot does not move"
+                    .into(),
+            ));
+        }
+        let r = qr.thin_R().to_owned();
+        let (mut covariance, mut power) = (Mat::zeros(0, 0), Vec::new());
+        if coloured {
+            let q = qr.compute_thin_Q();
+            power = self.powers(&a, &y, &values, &q);
+            covariance = self.sandwich(q, &r, &power);
+        }
+        let solution = Solution {
+            residual: self.residual(&values),
+            values,
+            r,
+        };
+        Ok((solution, covariance, power))
+    }
+
+    /// Weighted rows and right-hand side, with those of the regularisation; turned into those of single frequencies or not.
+    fn rows(&self, deviation: &dyn Fn(usize, usize) -> f64, turned: bool) -> (Mat<f64>, Mat<f64>) {
         let n = self.columns();
         let rows: usize = self.system.parts.iter().map(|p| p.y.len()).sum();
         let mut a = Mat::<f64>::zeros(rows + n, n);
@@ -165,8 +264,39 @@ impl<'a> Solver<'a> {
                 r += 1;
             }
         }
-        // a breath of regularisation for columns that the motion does not tell apart; it changes
-        // the others by 1e-18 of themselves
+        if turned {
+            // least squares do not change where the rows are turned into those of single frequencies
+            self.turn(&mut a);
+            self.turn(&mut y);
+        }
+        self.regularise(&mut a, rows);
+        (a, y)
+    }
+
+    /// Power over frequency of what the unweighted fit leaves, actuator by actuator in record by record.
+    ///
+    /// # Errors
+    /// Signals that are not finite.
+    pub fn power(&self) -> Result<Vec<Vec<f64>>> {
+        Ok(self.solve_with(&|_, _| 1.0, true)?.2)
+    }
+
+    /// What the unweighted fit makes of other torques, one set a column: values of all columns.
+    pub fn respond(&self, torques: &Mat<f64>) -> Mat<f64> {
+        let (a, _) = self.rows(&|_, _| 1.0, false);
+        let (n, rows) = (a.ncols(), torques.nrows());
+        let padded = Mat::from_fn(rows + n, torques.ncols(), |i, k| match i < rows {
+            true => torques[(i, k)],
+            false => 0.0,
+        });
+        let x = a.qr().solve_lstsq(&padded);
+        Mat::from_fn(n, torques.ncols(), |i, k| x[(i, k)])
+    }
+
+    /// A breath of regularisation for columns that the motion does not tell apart, which changes the others by 1e-18 of
+    /// themselves; and what is known of the size of Stribeck forces.
+    fn regularise(&self, a: &mut Mat<f64>, rows: usize) {
+        let n = a.ncols();
         let mut top = 0.0f64;
         for c in 0..n {
             top = top.max(a.col(c).norm_l2());
@@ -175,43 +305,111 @@ impl<'a> Solver<'a> {
             let norm = a.col(c).norm_l2();
             a[(rows + c, c)] = 1e-9 * if norm > 0.0 { norm } else { top.max(1.0) };
         }
-        let qr = a.qr();
-        let values: Vec<f64> = {
-            let x = qr.solve_lstsq(&y);
-            (0..n).map(|c| x[(c, 0)]).collect()
-        };
-        if values.iter().any(|v| !v.is_finite()) {
-            return Err(Error::Infeasible(
-                "the least-squares problem of the load has no finite solution: the logs hold \
-                 numbers that are not finite, or the robot does not move"
-                    .into(),
-            ));
+        for p in 0..self.system.parts.len() {
+            for (k, force) in self.breakaway.iter().enumerate() {
+                let c = self.friction(p) + EACH * k + 3;
+                a[(rows + c, c)] = a[(rows + c, c)].max(1.0 / force);
+            }
         }
-        let residual = self
-            .system
-            .parts
-            .iter()
-            .enumerate()
-            .map(|(p, part)| {
-                (0..part.y.len())
-                    .map(|i| {
-                        let mut rest = part.y[i] - self.shift[p].get(i).copied().unwrap_or(0.0);
-                        self.row(p, part, i, &mut |c, v| rest -= values[c] * v);
-                        rest
-                    })
-                    .collect()
-            })
-            .collect();
-        Ok(Solution {
-            values,
-            residual,
-            r: qr.thin_R().to_owned(),
-        })
+    }
+
+    /// First row and number of rows of every actuator in every record.
+    fn blocks(&self) -> Vec<[usize; 2]> {
+        let mut first = 0;
+        let mut out = Vec::new();
+        for part in &self.system.parts {
+            for _ in 0..self.system.actuators {
+                out.push([first, part.count]);
+                first += part.count;
+            }
+        }
+        out
+    }
+
+    /// Turns the rows of every actuator in every record into those of single frequencies.
+    fn turn(&self, m: &mut Mat<f64>) {
+        let blocks = self.blocks();
+        for c in 0..m.ncols() {
+            for &[first, count] in &blocks {
+                let own: Vec<f64> = (first..first + count).map(|r| m[(r, c)]).collect();
+                if own.iter().all(|v| *v == 0.0) {
+                    continue;
+                }
+                for (k, v) in spectrum::rows(&own).into_iter().enumerate() {
+                    m[(first + k, c)] = v;
+                }
+            }
+        }
+    }
+
+    /// Power over frequency of what is left, actuator by actuator in record by record, from turned rows.
+    fn powers(&self, a: &Mat<f64>, y: &Mat<f64>, values: &[f64], q: &Mat<f64>) -> Vec<Vec<f64>> {
+        let mut out = Vec::new();
+        for [first, count] in self.blocks() {
+            let (mut e, mut h) = (Vec::with_capacity(count), Vec::with_capacity(count));
+            for row in first..first + count {
+                let fit: f64 = (0..a.ncols()).map(|c| a[(row, c)] * values[c]).sum();
+                e.push(y[(row, 0)] - fit);
+                h.push((0..q.ncols()).map(|c| q[(row, c)] * q[(row, c)]).sum());
+            }
+            out.push(spectrum::power(&e, &h));
+        }
+        out
+    }
+
+    /// Covariance of the least-squares solution of rows with this power: `R⁻¹ (Qᵀ diag(S) Q) R⁻ᵀ`.
+    fn sandwich(&self, mut q: Mat<f64>, r: &Mat<f64>, power: &[Vec<f64>]) -> Mat<f64> {
+        for ([first, _], power) in self.blocks().into_iter().zip(power) {
+            for (k, s) in power.iter().enumerate() {
+                for c in 0..q.ncols() {
+                    q[(first + k, c)] *= s.sqrt();
+                }
+            }
+        }
+        let mut root = q.transpose().to_owned();
+        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
+            r.as_ref(),
+            root.as_mut(),
+            faer::get_global_parallelism(),
+        );
+        &root * root.transpose()
+    }
+
+    /// What these values leave of the torques, record by record.
+    pub fn residual(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let left = |(p, part): (usize, &Part)| {
+            (0..part.y.len())
+                .map(|i| {
+                    let mut rest = part.y[i] - self.shift[p].get(i).copied().unwrap_or(0.0);
+                    self.row(p, part, i, &mut |c, v| rest -= values[c] * v);
+                    rest
+                })
+                .collect()
+        };
+        self.system.parts.iter().enumerate().map(left).collect()
     }
 
     /// Coulomb, viscous, offset and Stribeck force of an actuator in a record.
     pub fn friction_of(&self, s: &Solution, part: usize, a: usize) -> [f64; EACH] {
         let first = self.friction(part) + EACH * a;
         std::array::from_fn(|f| s.values[first + f])
+    }
+
+    /// Friction of row `i` of a record by these values, Stribeck force included.
+    pub fn friction_at(&self, values: &[f64], p: usize, i: usize) -> f64 {
+        let part = &self.system.parts[p];
+        let first = self.friction(p) + EACH * (i / part.count);
+        let three = part.friction.iter().enumerate();
+        let three: f64 = three.map(|(f, column)| values[first + f] * column[i]).sum();
+        three + values[first + 3] * self.peaks[p][i]
+    }
+
+    /// Their standard deviations, and that of the Stribeck speed, from the covariance of all columns.
+    pub fn friction_stds(&self, c: &Mat<f64>, part: usize, a: usize) -> [f64; EACH + 1] {
+        let first = self.friction(part) + EACH * a;
+        std::array::from_fn(|f| {
+            let k = if f < EACH { first + f } else { self.speed(a) };
+            c[(k, k)].max(0.0).sqrt()
+        })
     }
 }
