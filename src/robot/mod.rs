@@ -13,6 +13,7 @@ pub(crate) mod file;
 pub mod geometry;
 pub(crate) mod inertia;
 pub(crate) mod meant;
+pub(crate) mod mjcf;
 mod parameter;
 pub(crate) mod tool;
 pub(crate) mod urdf;

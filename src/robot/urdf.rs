@@ -58,20 +58,29 @@ pub struct StatedLimits {
 pub struct Urdf {
     /// `name` of `<robot>`; empty where it has none
     pub name: String,
-    file: PathBuf,
-    links: Vec<Link>,
-    joints: Vec<UrdfJoint>,
-    warnings: Vec<Warning>,
+    pub(super) file: PathBuf,
+    pub(super) links: Vec<Link>,
+    pub(super) joints: Vec<UrdfJoint>,
+    pub(super) warnings: Vec<Warning>,
+    /// acceleration of gravity in base axes, m/s²
+    pub(super) gravity: Vector3<f64>,
 }
 
+/// The standard gravity, m/s².
+pub(super) const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
 impl Urdf {
-    /// Reads the text of a URDF; `file` is what errors call it.
+    /// Reads the text of a URDF, or of an [MJCF](super::mjcf), told apart by the root element; `file` is what errors
+    /// call it.
     ///
     /// # Errors
     /// Malformed XML, an unexpanded xacro, a root other than `<robot>`, missing or duplicate
     /// names, a joint without type, parent or child, numbers that are not finite.
     pub fn parse(text: &str, file: &Path) -> Result<Self> {
-        read::read(text, file)
+        match super::mjcf::is(text) {
+            true => super::mjcf::read(text, file),
+            false => read::read(text, file),
+        }
     }
 
     /// The tree of moving bodies, with the standard gravity and no joint columns to identify.
@@ -157,20 +166,20 @@ impl Urdf {
 
 /// `<link>`.
 #[derive(Debug, Clone)]
-struct Link {
-    name: String,
-    line: usize,
+pub(super) struct Link {
+    pub(super) name: String,
+    pub(super) line: usize,
     /// about the origin and in the axes of the link frame; `None` without `<inertial>`
-    inertia: Option<Inertia>,
+    pub(super) inertia: Option<Inertia>,
     /// geometry in its frame
-    forms: Vec<Form>,
+    pub(super) forms: Vec<Form>,
     /// to be reported if the link turns out to move
-    warnings: Vec<Warning>,
+    pub(super) warnings: Vec<Warning>,
 }
 
 /// `type` of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     Revolute,
     Continuous,
     Prismatic,
@@ -181,48 +190,49 @@ enum Kind {
 
 /// `<joint>`.
 #[derive(Debug, Clone)]
-struct UrdfJoint {
-    name: String,
-    line: usize,
-    kind: Kind,
-    parent: String,
-    child: String,
-    rotation: Matrix3<f64>,
-    position: Vector3<f64>,
+pub(super) struct UrdfJoint {
+    pub(super) name: String,
+    pub(super) line: usize,
+    pub(super) kind: Kind,
+    pub(super) parent: String,
+    pub(super) child: String,
+    pub(super) rotation: Matrix3<f64>,
+    pub(super) position: Vector3<f64>,
     /// unit length
-    axis: Vector3<f64>,
+    pub(super) axis: Vector3<f64>,
     /// the three as they are meant
-    meant: Placement,
-    limit: Option<Limit>,
-    by_position: Option<ByPosition>,
-    mimic: Option<Mimic>,
-    damping: f64,
-    friction: f64,
+    pub(super) meant: Placement,
+    pub(super) limit: Option<Limit>,
+    pub(super) by_position: Option<ByPosition>,
+    pub(super) mimic: Option<Mimic>,
+    pub(super) damping: f64,
+    pub(super) friction: f64,
+    pub(super) armature: f64,
 }
 
 /// `<limit>`, as written.
 #[derive(Debug, Clone, Copy)]
-struct Limit {
-    line: usize,
-    lower: Option<f64>,
-    upper: Option<f64>,
-    velocity: Option<f64>,
-    effort: Option<f64>,
+pub(super) struct Limit {
+    pub(super) line: usize,
+    pub(super) lower: Option<f64>,
+    pub(super) upper: Option<f64>,
+    pub(super) velocity: Option<f64>,
+    pub(super) effort: Option<f64>,
 }
 
 /// `<position_based_velocity_limits>` of Franka's robot descriptions, as written.
 #[derive(Debug, Clone, Copy)]
-struct ByPosition {
-    line: usize,
-    deceleration: Option<f64>,
-    offset: Option<f64>,
+pub(super) struct ByPosition {
+    pub(super) line: usize,
+    pub(super) deceleration: Option<f64>,
+    pub(super) offset: Option<f64>,
 }
 
 /// `<mimic>`: `q = multiplier · q_joint + offset`.
 #[derive(Debug, Clone)]
-struct Mimic {
-    line: usize,
-    joint: String,
-    multiplier: f64,
-    offset: f64,
+pub(super) struct Mimic {
+    pub(super) line: usize,
+    pub(super) joint: String,
+    pub(super) multiplier: f64,
+    pub(super) offset: f64,
 }

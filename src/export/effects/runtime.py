@@ -132,11 +132,12 @@ def install(model):
     return installed
 
 
-def inverse(model, q, dq, ddq, dt, substep=2e-4):
+def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
     """Torque that the drives report along a motion (samples, joints), N m or N, all effects included.
 
     model: robot.xml as MuJoCo loads it; q, dq, ddq: what the encoders read (samples, joints), with its derivatives;
-    dt: time between samples, s. Joints that no drive moves are integrated from rest on their springs.
+    dt: time between samples, s; memory: from `start`, or a dict that carries it from run to run (it is changed; empty
+    before the first). Joints that no drive moves are integrated on their springs.
     """
     import mujoco
 
@@ -151,6 +152,9 @@ def inverse(model, q, dq, ddq, dt, substep=2e-4):
     # the solver's friction takes its sign from the acceleration too; along a motion that of the velocity is known
     here.loss = model.dof_frictionloss[here.dof].copy()
     model.dof_frictionloss[here.dof] = 0.0
+
+    if memory:
+        here.memory[data._address] = (0.0, dict(memory))
 
     def forces(x, v, a, time):
         moved = zip((x, v, a), displacement(x, v, a))
@@ -204,6 +208,8 @@ def inverse(model, q, dq, ddq, dt, substep=2e-4):
         mujoco.set_mjcb_passive(previous)
         model.opt.disableflags = flags
         model.dof_frictionloss[here.dof] = here.loss
+    if memory is not None:
+        memory.update(here.memory[data._address][1])
     tau, times = reported(tau), dt * np.arange(len(q))
     for j, seconds in DELAYED:
         tau[:, j] = np.interp(times - seconds, times, tau[:, j])

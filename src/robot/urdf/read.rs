@@ -239,7 +239,6 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
         let tag = root.tag_name().name();
         let hint = match tag {
             "sdf" => "this is an SDF model; convert it to URDF",
-            "mujoco" => "this is an MJCF model; convert it to URDF",
             _ => "is this another kind of file?",
         };
         return Err(source.error(
@@ -258,6 +257,7 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
         links: Vec::new(),
         joints: Vec::new(),
         warnings: Vec::new(),
+        gravity: super::GRAVITY,
     };
     let (mut links, mut joints) = (HashMap::new(), HashMap::new());
     for node in root.children().filter(Node::is_element) {
@@ -605,5 +605,6 @@ fn joint(
         mimic,
         damping,
         friction,
+        armature: 0.0,
     })
 }

@@ -85,7 +85,8 @@ pub(super) fn build(urdf: &Urdf, options: &Options) -> Result<Robot> {
             continue;
         }
         let followed = &mut joints[coordinate[leader]];
-        // virtual work of the follower's friction
+        // virtual work of the follower's inertia and friction
+        followed.terms[0] += ratio * ratio * joint.armature;
         followed.terms[1] += ratio * ratio * joint.damping;
         followed.terms[2] += ratio.abs() * joint.friction;
         let stated = options.limits.get(leader_name).copied().unwrap_or_default();
@@ -105,7 +106,7 @@ pub(super) fn build(urdf: &Urdf, options: &Options) -> Result<Robot> {
         name: urdf.name.clone(),
         bodies,
         joints,
-        gravity: Vector3::new(0.0, 0.0, -9.81),
+        gravity: urdf.gravity,
         prior: Prior::default(),
         warnings,
         path: None,
@@ -252,7 +253,7 @@ fn coordinate_of(
         piston: None,
         continuous_torque: None,
         continuous_power: None,
-        terms: [0.0, joint.damping, joint.friction, 0.0],
+        terms: [joint.armature, joint.damping, joint.friction, 0.0],
         identify: [false; 4],
     })
 }
