@@ -1,6 +1,6 @@
 //! `excite diagnose EXPERIMENT`.
 
-use super::{Folder, pretty, print, unwritten, warn};
+use super::{Folder, outside, pretty, print, unwritten, warn};
 use excite::Result;
 use excite::diagnose::{Settings, diagnose, json, page};
 use excite::export::{self, Model};
@@ -40,6 +40,10 @@ pub struct Args {
     /// Seed of the random starts of that design
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
+    /// relative to it
+    #[arg(long, value_name = "PA", default_value_t = 101_325.0)]
+    atmosphere: f64,
     /// Print diagnosis.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
@@ -47,7 +51,8 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let experiment = Experiment::read(&args.experiment)?;
+    let mut experiment = Experiment::read(&args.experiment)?;
+    experiment.press(outside(args.atmosphere)?)?;
     let mut names = vec!["diagnosis.json", "report.html", "next.json"];
     names.extend(export::files(&experiment.plant));
     let folder = Folder::new(&args.output, &names, args.force)?;

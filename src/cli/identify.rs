@@ -1,6 +1,6 @@
 //! `excite identify EXPERIMENT`.
 
-use super::{Folder, pretty, print, unwritten, warn};
+use super::{Folder, outside, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
 use excite::identify::page;
 use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
@@ -61,6 +61,10 @@ pub struct Args {
     /// none for any joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
+    /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
+    /// relative to it
+    #[arg(long, value_name = "PA", default_value_t = 101_325.0)]
+    atmosphere: f64,
     /// Print report.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
@@ -69,6 +73,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let mut experiment = Experiment::read(&args.experiment)?;
+    experiment.press(outside(args.atmosphere)?)?;
     let mut notes = excite::survey::check(&experiment.plant, &experiment.records)?;
     experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
     let mut settings = Settings {

@@ -1,7 +1,8 @@
 //! `excite load EXPERIMENT`.
 
-use super::{pretty, print, warn, write};
+use super::{Folder, outside, pretty, print, unwritten, warn, write};
 use clap::ValueEnum;
+use excite::export::{self, Model};
 use excite::load::{self, Identified, Method, Parameters, Settings};
 use excite::log::Experiment;
 use excite::output::prepare_dir;
@@ -62,6 +63,9 @@ pub struct Args {
     /// Cut-off of the filter that torques and model pass, Hz; inf for none [default: from the data]
     #[arg(long, value_name = "HZ")]
     cutoff: Option<f64>,
+    /// Write the robot with the load, too: robot.toml and the other robot files
+    #[arg(long)]
+    robot: bool,
     /// Write the load for a controller, too: franka (endeffector-config.json for Desk), ur (set_target_payload.script),
     /// kuka (load_data.dat)
     #[arg(
@@ -124,12 +128,7 @@ enum How {
 }
 
 pub fn run(args: Args) -> Result<()> {
-    if !(args.atmosphere >= 0.0 && args.atmosphere.is_finite()) {
-        return Err(Error::Argument(format!(
-            "--atmosphere is a pressure in Pa, not {}",
-            args.atmosphere
-        )));
-    }
+    let atmosphere = outside(args.atmosphere)?;
     for (name, value) in [
         ("standstill", args.standstill),
         ("position-cutoff", args.position_cutoff),
@@ -156,7 +155,7 @@ pub fn run(args: Args) -> Result<()> {
         consistent: !args.unconstrained,
         checked: !args.unchecked,
         standstill: args.standstill,
-        atmosphere: args.atmosphere,
+        atmosphere,
         ..Settings::default()
     };
     if let Some(pose) = &args.flange {
@@ -175,8 +174,28 @@ pub fn run(args: Args) -> Result<()> {
     let experiment = Experiment::read(&args.experiment)?;
     let mut names = vec!["load.json", "report.html"];
     names.extend(args.controllers.iter().map(|c| c.file()));
-    let files = prepare_dir(&args.output, &names, args.force)?;
-    let found = load::identify(&experiment, &settings)?;
+    let own = names.len();
+    if args.robot {
+        names.extend(export::files(&experiment.plant));
+    }
+    let mut files = prepare_dir(&args.output, &names, args.force)?;
+    files.truncate(own);
+    let mut found = load::identify(&experiment, &settings)?;
+    let texts = match args.robot {
+        true => {
+            let robot = found.loaded(&experiment.plant)?;
+            let model = Model {
+                plant: &experiment.plant,
+                robot: &robot,
+                remarks: &[],
+            };
+            found.warnings.extend(model.warnings());
+            let texts = export::write(&model);
+            found.warnings.extend(unwritten(&texts, "load.json"));
+            texts
+        }
+        false => Vec::new(),
+    };
     warn(&found.warnings);
     let json = load::json::json(&found);
     write(&files[0], args.force, &pretty(&json))?;
@@ -184,6 +203,7 @@ pub fn run(args: Args) -> Result<()> {
     for (controller, file) in args.controllers.iter().zip(&files[2..]) {
         write(file, args.force, &controller.text(&found)?)?;
     }
+    files.extend(Folder::new(&args.output, &[], args.force)?.robot(texts)?);
     match args.json {
         true => print(&pretty(&json)),
         false => print(&summary(&found, &files)),

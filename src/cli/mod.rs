@@ -243,6 +243,16 @@ pub fn unwritten(texts: &[(&'static str, Result<String>)], values: &str) -> Vec<
         .collect()
 }
 
+/// The pressure of `--atmosphere`.
+fn outside(pressure: f64) -> Result<f64> {
+    match pressure >= 0.0 && pressure.is_finite() {
+        true => Ok(pressure),
+        false => Err(Error::Argument(format!(
+            "--atmosphere is a pressure in Pa, not {pressure}"
+        ))),
+    }
+}
+
 /// Writes a text file into a prepared directory.
 fn write(path: &Path, force: bool, text: &str) -> Result<()> {
     excite::output::write_atomic(path, force, |w| w.write_all(text.as_bytes()))

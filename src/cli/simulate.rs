@@ -84,6 +84,10 @@ pub struct Args {
     /// Also log the true pose of the platform, x y z qw qx qy qz (parallel robots)
     #[arg(long)]
     pose: bool,
+    /// Log the pressures of both chambers of every cylinder, pa and pb, in place of forces: mean of the two, Pa (robots
+    /// with `piston`)
+    #[arg(long, value_name = "PA")]
+    pressures: Option<f64>,
     /// Load on the last body or platform: kg, centre of mass (m), tensor about the centre of mass
     /// (kg m²)
     #[arg(
@@ -215,10 +219,18 @@ pub fn run(args: Args) -> Result<()> {
     }
     warnings.extend(run.warnings.iter().cloned());
     warn(&warnings);
+    if let Some(mean) = args.pressures
+        && !(mean > 0.0 && mean.is_finite())
+    {
+        return Err(Error::Argument(format!(
+            "--pressures is a mean pressure in Pa, not {mean}"
+        )));
+    }
     let measured = measure(&run, &sensors, &settings.effects, settings.seed);
     let columns = Columns {
         derivatives: args.derivatives,
         pose: args.pose,
+        pressures: args.pressures,
     };
     write_log(&args.output, args.force, &plant, &run, &measured, columns)?;
     let mut out = summary(&plant, &run, &args, periods, trajectory.fourier.period);

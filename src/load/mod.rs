@@ -53,7 +53,7 @@ pub use gain::Gains;
 pub use identified::Identified;
 pub use one_step::OneStep;
 #[doc(hidden)]
-pub use records::{Loaded, pressure_forces};
+pub use records::Loaded;
 pub use settings::{Method, Parameters, Settings};
 pub use two_step::TwoStep;
 

@@ -36,6 +36,9 @@ pub struct OneStep {
     pub records: Vec<Fitted>,
     /// spread of the residual of each actuator
     pub spreads: Vec<Spread>,
+    /// what the empty platform of a closed chain deviates by from the robot file, ten parameters about its origin; `None`
+    /// without a record of it, and of a serial robot
+    pub platform: Option<[f64; 10]>,
     /// constant forces of the actuators: shared by the records, drifting or free; empty with a single record
     pub zeros: Vec<Decision>,
     /// condition number of the weighted columns of the load, scaled to unit length
@@ -96,6 +99,7 @@ pub fn estimate(
         records: (0..system.parts.len())
             .map(|p| fitted::fitted(&solver, &solution, &all, &load, p))
             .collect(),
+        platform: (empty && plant.closed()).then(|| ten::platform(&system, &solution)),
         zeros,
         load,
         spreads,

@@ -24,7 +24,7 @@ pub struct Loaded {
 pub fn prepared(experiment: &Experiment, settings: &Settings) -> Result<Vec<Loaded>> {
     let plant = &experiment.plant;
     let one = |record: &Record| {
-        let pressed = pressure_forces(record, plant, settings.atmosphere)?;
+        let pressed = record.with_forces(plant, settings.atmosphere)?;
         let exchanged = match (&pressed, settings.checked && plant.closed()) {
             (Some(_), true) => exchanged(record, plant, settings)?,
             _ => None,
@@ -45,7 +45,7 @@ fn exchanged(record: &Record, plant: &Plant, settings: &Settings) -> Result<Opti
         pressures: (record.pressures.clone()).map(|[a, b]| [b, a]),
         ..record.clone()
     };
-    let Some(forces) = pressure_forces(&turned, plant, settings.atmosphere)? else {
+    let Some(forces) = turned.with_forces(plant, settings.atmosphere)? else {
         return Ok(None);
     };
     Ok(Some(
@@ -78,39 +78,4 @@ pub fn check(records: &[Loaded]) -> Result<()> {
 /// Whether any record carried this.
 pub fn any(records: &[Loaded], payload: Payload) -> bool {
     records.iter().any(|r| r.payload == payload)
-}
-
-/// The record with forces from the chamber pressures where it has no torques:
-///
-/// ```text
-/// f = p_a A_a − p_b A_b − p_atm (A_a − A_b)
-/// ```
-///
-/// # Errors
-/// A log with pressures of a robot without piston areas.
-pub fn pressure_forces(record: &Record, plant: &Plant, atmosphere: f64) -> Result<Option<Record>> {
-    let Some([pa, pb]) = record.pressures.as_ref().filter(|_| record.tau.is_empty()) else {
-        return Ok(None);
-    };
-    let tau = plant
-        .actuators()
-        .iter()
-        .zip(pa.iter().zip(pb))
-        .map(|(joint, (a, b))| {
-            let Some([area_a, area_b]) = joint.piston else {
-                return Err(Error::Infeasible(format!(
-                    "{}: the log has chamber pressures, but `{}` no piston areas; add piston = \
-                     [AREA_A, AREA_B] in m^2 to [actuator] or to its [[joint]] in the robot file",
-                    record.name, joint.name
-                )));
-            };
-            let outside = atmosphere * (area_a - area_b);
-            let force = |(a, b): (&f64, &f64)| a * area_a - b * area_b - outside;
-            Ok(a.iter().zip(b).map(force).collect())
-        })
-        .collect::<Result<Vec<Vec<f64>>>>()?;
-    Ok(Some(Record {
-        tau,
-        ..record.clone()
-    }))
 }

@@ -57,7 +57,7 @@ impl Default for Settings {
             consistent: true,
             standstill: None,
             checked: true,
-            atmosphere: 101_325.0,
+            atmosphere: crate::log::pressure::ATMOSPHERE,
             flange: [0.0; 6],
             signals: signals::Settings::default(),
         }

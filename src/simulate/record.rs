@@ -2,7 +2,7 @@
 
 use super::{Effects, Run};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::log::{Payload, Purpose, Record};
+use crate::log::{Payload, Purpose, Record, pressure};
 use crate::output::write_atomic;
 use crate::plant::{DEFAULT_NOISE, Plant};
 use nalgebra::{Rotation3, UnitQuaternion};
@@ -134,12 +134,14 @@ pub fn to_record(run: &Run, measured: &Measured, purpose: Purpose, period: f64) 
 }
 
 /// Which columns a log has beside `t`, `q`, `tau` and `qref`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Columns {
     /// true velocities and accelerations of the actuators, `dq`, `ddq`
     pub derivatives: bool,
     /// true pose of the platform, `x y z qw qx qy qz`
     pub pose: bool,
+    /// mean of the chamber pressures, Pa, which stand in place of the forces
+    pub pressures: Option<f64>,
 }
 
 /// Writes a log as `docs/formats.md` describes it.
@@ -165,9 +167,24 @@ pub fn write_log(
         debug_assert_eq!(values.len(), na * count);
     };
     add("q", &measured.q);
-    add("tau", &measured.tau);
+    let pressures = match columns.pressures {
+        Some(mean) => Some(pressure::of_forces(plant, &measured.tau, mean)?),
+        None => None,
+    };
+    match &pressures {
+        Some([a, b]) => {
+            add("pa", a);
+            add("pb", b);
+        }
+        None => add("tau", &measured.tau),
+    }
     add("qref", &run.reference);
-    let mut sources = vec![&measured.q, &measured.tau, &run.reference];
+    let mut sources = vec![&measured.q];
+    match &pressures {
+        Some([a, b]) => sources.extend([a, b]),
+        None => sources.push(&measured.tau),
+    }
+    sources.push(&run.reference);
     if columns.derivatives {
         add("dq", &run.actuators.qd);
         add("ddq", &run.actuators.qdd);

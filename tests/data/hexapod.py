@@ -299,7 +299,7 @@ def make(folder, c, seed):
     offset = r.normal(0, 3, 6)
     moved = offset + c["zeros"] * r.normal(0, 1, 6)
     for name, carried, o, k in (("empty", None, offset, 1), ("loaded", load, moved, 2)):
-        write_log(f"{folder}/{name}.csv", m, *record(m, c, 100 * seed + k, seed, carried, o), c["pressures"])
+        write_log(f"{folder}/{name}.csv", m, *record(m, c, [c["number"], seed, k], seed, carried, o), c["pressures"])
     write_robot(f"{folder}/robot.toml", m, c, seed)
     with open(f"{folder}/experiment.toml", "w") as file:
         file.write('robot = "robot.toml"\n')
@@ -348,10 +348,11 @@ def main():
         return check(args.check)
     print(f"{'':28s} | mass % (rms) | centre mm | tensor % | covered, one step | two steps")
     total = {"one_step": [], "two_step": []}
-    for name, change in CONDITIONS.items():
+    for number, (name, change) in enumerate(CONDITIONS.items()):
         if args.conditions not in name:
             continue
-        c = ORDINARY | change
+        # noise of its own for every condition
+        c = ORDINARY | change | dict(number=number)
         found = {"one_step": ([], []), "two_step": ([], [])}
         for seed in range(args.machines):
             folder = f"{args.output}/{name.replace(' ', '_').replace(chr(39), '')}_{seed}"

@@ -278,6 +278,13 @@ fn both_methods_are_exact_without_noise() {
     // in percent and millimetres: 1e-10 of the quantities
     assert!(largest(&one) < 1e-8, "{one:?}");
     assert!(largest(&two) < 1e-7, "{two:?}");
+    // the robot with the load: its platform of 30 kg carries 22.26 kg more, and a file can hold it
+    let plant = Plant::load("hexapod").unwrap();
+    let robot = found.loaded(&plant).unwrap();
+    let platform = robot.bodies.iter().find(|b| b.name == "platform").unwrap();
+    assert!((platform.inertia.mass() - 52.26).abs() < 1e-6);
+    let text = excite::export::mechanism::toml(plant.mechanism().unwrap(), &robot, "").unwrap();
+    assert!(text.contains("mass = 52.2"), "{text}");
     let friction = &found.one_step.records[1].friction[0];
     assert!((friction.coulomb - 28.0).abs() < 1e-8, "{friction:?}");
     // from the nominal platform alone
@@ -549,9 +556,7 @@ fn pressures_give_forces() {
     let log = dir.path().join("log.csv");
     std::fs::write(&log, csv).unwrap();
     let record = excite::log::Record::read(&log, &plant, Purpose::Fit, None).unwrap();
-    let forces = excite::load::pressure_forces(&record, &plant, 101_325.0)
-        .unwrap()
-        .unwrap();
+    let forces = record.with_forces(&plant, 101_325.0).unwrap().unwrap();
     let wanted = (4e5 + 2e3 + 1e3) * 1.963e-3 - (3e5 - 500.0) * 1.649e-3 - 101_325.0 * 0.314e-3;
     assert!(
         (forces.tau[2][1] - wanted).abs() < 1e-9,
@@ -559,7 +564,7 @@ fn pressures_give_forces() {
         forces.tau[2][1]
     );
     let bare = Plant::load("hexapod").unwrap();
-    let e = excite::load::pressure_forces(&record, &bare, 101_325.0).unwrap_err();
+    let e = record.with_forces(&bare, 101_325.0).unwrap_err();
     assert!(e.to_string().contains("piston ="), "{e}");
 }
 

@@ -358,6 +358,7 @@ fn a_log_is_read_back() {
     let columns = Columns {
         derivatives: true,
         pose: true,
+        ..Columns::default()
     };
     write_log(&path, false, &plant, &run, &measured, columns).unwrap();
     assert!(write_log(&path, false, &plant, &run, &measured, columns).is_err());
@@ -480,4 +481,40 @@ fn samples_of_another_robot_are_refused() {
     let e = simulate(&plant, &fourier, 1, &quick(), &|_| {}).unwrap_err();
     assert!(e.is_argument() && e.to_string().contains("panda"));
     let _ = Samples::zeros(1, 1);
+}
+
+#[test]
+fn pressures_are_the_forces() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = include_str!("../../src/mechanism/bundled/hexapod.toml");
+    let piston = "[actuator]\npiston = [1.9635e-3, 1.6493e-3]";
+    let robot = dir.path().join("robot.toml");
+    std::fs::write(&robot, text.replace("[actuator]", piston)).unwrap();
+    let plant = Plant::load(robot.to_str().unwrap()).unwrap();
+    let fourier = motion(&plant, 2.0, 0.4, 2);
+    let run = simulate(&plant, &fourier, 1, &quick(), &|_| {}).unwrap();
+    let (sensors, _) = Sensors::new(&plant, 1.0);
+    let measured = measure(&run, &sensors, &Effects::default(), 1);
+    let path = dir.path().join("log.csv");
+    let columns = Columns {
+        pressures: Some(4e5),
+        ..Columns::default()
+    };
+    write_log(&path, false, &plant, &run, &measured, columns).unwrap();
+    let record = excite::log::Record::read(&path, &plant, excite::log::Purpose::Fit, None).unwrap();
+    assert!(record.tau.is_empty() && record.pressures.is_some());
+    let forces = record.with_forces(&plant, 101_325.0).unwrap().unwrap();
+    let flat: Vec<f64> = forces.tau.concat();
+    assert_eq!(flat.len(), measured.tau.len());
+    for (a, b) in flat.iter().zip(&measured.tau) {
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+    // a mean that is too low, and a robot without pistons
+    let low = Columns {
+        pressures: Some(1e3),
+        ..columns
+    };
+    assert!(write_log(&path, true, &plant, &run, &measured, low).is_err());
+    let bare = Plant::load("hexapod").unwrap();
+    assert!(write_log(&path, true, &bare, &run, &measured, columns).is_err());
 }

@@ -46,6 +46,18 @@ pub fn values(
     (phi, ten)
 }
 
+/// Deviations of the platform of a closed chain, zero where they are not estimated.
+pub fn platform(system: &System, solution: &Solution) -> [f64; 10] {
+    let value = |name: &str| {
+        let at = system
+            .deviations
+            .iter()
+            .position(|d| d.strip_prefix("platform.") == Some(name));
+        at.map_or(0.0, |c| solution.values[c])
+    };
+    NAMES.map(value)
+}
+
 /// Which of the ten are known by themselves, and why the others are not.
 pub fn known(system: &System) -> ([bool; 10], Vec<String>) {
     let mut known = [false; 10];

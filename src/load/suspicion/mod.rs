@@ -8,14 +8,13 @@
 mod carried;
 mod forces;
 mod positions;
-mod pressures;
 
 pub(super) use carried::negative;
 pub(super) use forces::check as forces;
 
 use super::system::System;
 use crate::error::{Result, Warning};
-use crate::log::Experiment;
+use crate::log::{Experiment, pressure};
 use crate::plant::Plant;
 
 /// Before the signals are prepared: units of positions and pressures.
@@ -25,7 +24,7 @@ use crate::plant::Plant;
 pub fn raw(experiment: &Experiment, atmosphere: f64) -> Result<()> {
     for record in &experiment.records {
         positions::check(record, &experiment.plant)?;
-        pressures::check(record, &experiment.plant, atmosphere)?;
+        pressure::check(record, &experiment.plant, atmosphere)?;
     }
     Ok(())
 }
