@@ -59,6 +59,9 @@ class Model:
         self._model.opt.disableflags |= int(bits.mjDSBL_CONTACT) | int(bits.mjDSBL_LIMIT)
         self._drives = self._actuators()
         self._own_step = float(self._model.opt.timestep)
+        # what is not in the file costs no time in every step
+        self._displaced = bool(getattr(self._effects, "DISPLACED", []))
+        self._driven = any(not native for _, _, native in getattr(self._effects, "DRIVES", []))
         #: whether something in it goes on by itself, so that a run needs a time before it
         self.remembers = self._model.nv > len(joints) or bool(getattr(self._effects, "REMEMBERED", []))
 
@@ -108,7 +111,7 @@ class Model:
             mj.set_mjcb_passive(previous)
 
     def _set(self, data: Any, q: Array, dq: Array) -> None:
-        if self._effects is not None:
+        if self._effects is not None and self._displaced:
             zero = np.zeros_like(q)
             way, rate, _ = self._effects.displacement(q, dq, zero)
             q, dq = q + way, dq + rate
@@ -117,7 +120,9 @@ class Model:
 
     def _read(self, data: Any) -> "Tuple[Array, Array]":
         q, dq = data.qpos[self._at], data.qvel[self._dof]
-        return (q if self._effects is None else np.asarray(self._effects.encoder(q))), dq
+        if self._effects is not None and self._displaced:
+            q = np.asarray(self._effects.encoder(q))
+        return q, dq
 
     def _play(self, data: Any, command: Command, steps: int) -> Array:
         mj = self._mj
@@ -139,7 +144,7 @@ class Model:
                 for j in np.flatnonzero(late):
                     # what the log shows now was done a while ago
                     tau[j] += command.recorded(min(t + late[j], command.duration))[2][j] - command.recorded(t)[2][j]
-                if self._effects is not None:
+                if self._effects is not None and self._driven:
                     tau = np.asarray(self._effects.command(tau))
                 if self._drives is None:
                     data.qfrc_applied[self._dof] = tau

@@ -3,9 +3,10 @@
 Bodies are sampled about the identified ones in coordinates that only bodies that can exist have: the pseudo-inertia is
 ``J = L exp(S) L'`` with ``J0 = L L'`` identified and ``S`` symmetric; friction and armature are ``x0 exp(s)``. In these
 coordinates the prior of the identification, of strength ``gamma``, is ``gamma |S|^2 / 2`` to second order, and the data
-know the base parameters ``pi = T phi`` with their covariance ``C``:
+know the base parameters ``pi = T phi`` with their covariance ``C``. A sample minimises, for data ``pi_k ~ N(pi0, C)`` and
+a prior ``S_k ~ N(0, 1/gamma)`` that were drawn,
 
-    precision = (T dphi/dS)' C^-1 (T dphi/dS) + gamma
+    (T phi(S) - pi_k)' C^-1 (T phi(S) - pi_k) + gamma |S - S_k|^2
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from ._records import Experiment
     from ._results import Identification
 
+#: Weakest prior of what the data do not see: nominal values that are good to 50 %.
+WEAKEST = 4.0
+
 #: Symmetric unit matrices of order four, of length one.
 _PAIRS = [(i, j) for i in range(4) for j in range(i, 4)]
 
@@ -34,6 +38,9 @@ def _units() -> Array:
     for k, (i, j) in enumerate(_PAIRS):
         out[k, i, j] = out[k, j, i] = 1.0 if i == j else np.sqrt(0.5)
     return out
+
+
+_UNITS = _units()
 
 
 def pseudo(ten: Array) -> Array:
@@ -47,11 +54,11 @@ def pseudo(ten: Array) -> Array:
 
 
 def ten_of(j: Array) -> Array:
-    """The ten parameters of a pseudo-inertia."""
-    s, h, m = j[:3, :3], j[:3, 3], j[3, 3]
-    tensor = np.trace(s) * np.eye(3) - s
-    upper = tensor[np.triu_indices(3)]
-    return np.concatenate([[m], h, upper])
+    """The ten parameters of a pseudo-inertia, or of many."""
+    xx, yy, zz = j[..., 0, 0], j[..., 1, 1], j[..., 2, 2]
+    first = [j[..., 3, 3], j[..., 0, 3], j[..., 1, 3], j[..., 2, 3]]
+    tensor = [yy + zz, -j[..., 0, 1], -j[..., 0, 2], xx + zz, -j[..., 1, 2], xx + yy]
+    return np.stack(first + tensor, axis=-1)
 
 
 class Posterior:
@@ -162,20 +169,68 @@ def sample(model: "Identification", n: int, seed: int) -> Posterior:
     t = np.zeros((len(base.kept), len(best)))
     t[np.arange(len(base.kept)), base.kept] = 1.0
     t[:, base.dropped] = base.k
-    strength = float(model.to_dict()["prior"]["strength"])
-    if not strength > 0:
-        raise unusable("the identification has no prior (consistency=\"free\"): what the data do not see has no bounds")
+    strength = max(float(model.to_dict()["prior"]["strength"]), WEAKEST)
     coordinates, jacobian = _coordinates(names, best)
-    seen = t @ jacobian
     # whitened, by eigenvalues: what is known exactly needs no inverse
     values, vectors = np.linalg.eigh(0.5 * (model.base_covariance + model.base_covariance.T))
-    floor = 1e-14 * values.max()
-    white = (vectors / np.sqrt(np.maximum(values, floor))).T @ seen
-    precision = white.T @ white + strength * np.eye(jacobian.shape[1])
+    white = (vectors / np.sqrt(np.maximum(values, 1e-14 * values.max()))).T @ t
     rng = np.random.default_rng(seed)
-    steps = np.linalg.solve(np.linalg.cholesky(precision).T, rng.standard_normal((jacobian.shape[1], n))).T
-    rows = np.array([_moved(best, coordinates, s) for s in steps]).reshape(n, len(best))
-    return Posterior(robot, names, [p["unit"] for p in listed], rows, best)
+    rows = [_one(best, coordinates, jacobian, white, strength, rng) for _ in range(n)]
+    return Posterior(robot, names, [p["unit"] for p in listed], np.array(rows), best)
+
+
+def _one(
+    best: Array, groups: "List[_Group]", jacobian: Array, white: Array, strength: float, rng: np.random.Generator
+) -> Array:
+    """One sample: the fit to data and a prior that were disturbed as they are uncertain (randomise, then optimise;
+    Bardsley, Solonen, Haario & Laine 2014). The coordinates are not linear, so a few damped Gauss-Newton steps solve it."""
+    data = white @ best + rng.standard_normal(len(white))
+    prior = rng.standard_normal(jacobian.shape[1]) / np.sqrt(strength)
+
+    def residual(x: Array) -> "Tuple[Array, Array]":
+        phi = _moved(best, groups, x)
+        return phi, np.concatenate([white @ phi - data, np.sqrt(strength) * (x - prior)])
+
+    # the prior alone is far from the data: from the identified values on
+    x: Array = np.zeros(jacobian.shape[1])
+    phi, r = residual(x)
+    damping = 1e-3
+    for _ in range(30):
+        slope = np.vstack([white @ _slopes(groups, x, jacobian, best), np.sqrt(strength) * np.eye(len(x))])
+        normal, down = slope.T @ slope, slope.T @ r
+        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -down)
+        there, left = residual(x + step)
+        if np.isfinite(left).all() and left @ left <= r @ r:
+            done = r @ r - left @ left < 1e-6 * len(x)
+            x, phi, r, damping = x + step, there, left, max(0.1 * damping, 1e-12)
+            if done:
+                break
+        else:
+            damping *= 10.0
+            if damping > 1e12:
+                break
+    return phi
+
+
+def _slopes(groups: "List[_Group]", x: Array, jacobian: Array, best: Array) -> Array:
+    """Derivatives of the parameters at a place in the coordinates: of ``exp(S)`` by its eigenvalues."""
+    out: Array = jacobian.copy()
+    at, units = 0, _UNITS
+    for where, root, kind in groups:
+        if root is None:
+            if kind == "positive":
+                out[where[0], at] = best[where[0]] * np.exp(x[at])
+            at += 1
+            continue
+        values, v = np.linalg.eigh(np.tensordot(x[at : at + 10], units, axes=1))
+        e = np.exp(values)
+        apart = values[:, None] - values[None, :]
+        near = np.abs(apart) < 1e-9
+        ratio = np.where(near, 0.5 * (e[:, None] + e[None, :]), (e[:, None] - e[None, :]) / np.where(near, 1.0, apart))
+        turned = v @ (ratio * (v.T @ units @ v)) @ v.T
+        out[where[0] : where[-1] + 1, at : at + 10] = ten_of(root @ turned @ root.T).T
+        at += 10
+    return out
 
 
 #: One group of coordinates: parameters that it moves, and the factor of a pseudo-inertia or nothing for single numbers.
@@ -186,7 +241,7 @@ def _coordinates(names: List[str], best: Array) -> "Tuple[List[_Group], Array]":
     """Coordinates in which everything can exist, and the derivatives of the parameters with respect to them."""
     groups: List[_Group] = []
     columns: List[Array] = []
-    units = _units()
+    units = _UNITS
     k = 0
     while k < len(names):
         link, _, what = names[k].rpartition(".")
@@ -215,7 +270,7 @@ def _coordinates(names: List[str], best: Array) -> "Tuple[List[_Group], Array]":
 def _moved(best: Array, groups: "List[_Group]", step: Array) -> Array:
     """The parameters at a place in the coordinates."""
     out: Array = best.copy()
-    at, units = 0, _units()
+    at, units = 0, _UNITS
     for where, root, kind in groups:
         if root is not None:
             s = np.tensordot(step[at : at + 10], units, axes=1)

@@ -444,6 +444,23 @@ class Diagnosis(Result):
     _may = ("robot.urdf", "robot.xml", "robot.toml", "effects.py", "next.json")
     _rows = "findings"
 
+    @classmethod
+    def read(cls, folder: PathLike) -> "Diagnosis":
+        """Read the folder that ``excite diagnose`` or :meth:`save` wrote."""
+        folder = Path(os.fspath(folder))
+        self = cls.__new__(cls)
+        try:
+            self._json = (folder / cls._file).read_text(encoding="utf-8")
+            self._page = (folder / "report.html").read_text(encoding="utf-8")
+            there = [name for name in cls._may if (folder / name).is_file()]
+            self._files = {name: (folder / name).read_text(encoding="utf-8") for name in there}
+            self._value = json.loads(self._json)
+            self.warnings = [Notice(w["kind"], w["subject"], w["message"]) for w in self._value["warnings"]]
+        except (OSError, ValueError, KeyError, TypeError) as e:
+            raise unusable(f"{folder} is no folder of a diagnosis: {e}") from None
+        self._report = None
+        return self
+
     @property
     def verdict(self) -> str:
         """``"no_gap"``, ``"explained"``, ``"partly_explained"`` or ``"unknown"``."""

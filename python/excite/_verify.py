@@ -100,7 +100,7 @@ def verify(
     experiment: Union[Experiment, PathLike],
     simulator: Union[str, Simulator, Sequence[Simulator]] = "mujoco",
     *,
-    diagnosis: Optional[Diagnosis] = None,
+    diagnosis: Union[Diagnosis, PathLike, None] = None,
     horizons: Sequence[float] = (0.1, 0.3, 1.0, 3.0),
     runs: int = 8,
     progress: Progress = None,
@@ -117,7 +117,7 @@ def verify(
             ``(q0, dq0, command, dt) -> positions`` that starts at ``q0`` and ``dq0`` ``(joints,)``, is told
             ``command(t, q, dq)`` (N m or N, see :class:`excite.Command`), and gives a row every ``dt`` s,
             ``(command.steps + 1, joints)``; or a pair of them, before and after.
-        diagnosis: what to verify; made from the experiment where left out.
+        diagnosis: what to verify, or the folder of it; made from the experiment where left out.
         horizons: lengths of the runs, s; the whole record is added.
         runs: most runs of each length.
         progress: as for :func:`excite.design`.
@@ -131,6 +131,8 @@ def verify(
     if not lengths or not all(math.isfinite(h) and h > 0 for h in lengths) or runs < 1:
         raise unusable("horizons are lengths in s, above 0, and runs at least 1")
     found = diagnosis
+    if isinstance(found, (str, os.PathLike)):
+        found = Diagnosis.read(found)
     if found is None:
         with Bar(progress, "diagnose") as bar:
             report = _excite.diagnose(core, next=False, next_tries=0, seed=1, progress=bar.report)

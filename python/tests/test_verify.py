@@ -43,6 +43,11 @@ def test_mujoco(hidden, diagnosis, tmp_path):
     for joint in found.to_dict()["torque"]["joints"]:
         # the same gap of the nominal model, by equations of others
         assert joint["nominal"] == pytest.approx(joint["own"], rel=0.02, abs=1.0)
+    diagnosis.save(tmp_path / "gap")
+    of_files = excite.verify(hidden, diagnosis=tmp_path / "gap", horizons=(0.1, 1.0))
+    assert of_files.to_dict() == found.to_dict()
+    with pytest.raises(excite.Error, match="no folder of a diagnosis"):
+        excite.verify(hidden, diagnosis=tmp_path)
     found.save(tmp_path)
     assert json.loads((tmp_path / "verification.json").read_text())["robot"] == "scara"
     page = (tmp_path / "report.html").read_text()
