@@ -5,11 +5,14 @@
 //! `b = 1 / timestep`, it is that of `q̇` down to `q̈ / b`. A constant torque is a spring so far away that its force
 //! does not change.
 
+mod joint;
+
 use super::element::{Element, Form, Kind};
 use super::{Format, LEAST, Model, Part, bounded, escape, possible, remark, xml_comment};
 use crate::error::Result;
 use crate::plant::Plant;
 use crate::robot::{Body, Inertia, JointTerm, Motion, Robot};
+use joint::OnJoint;
 use nalgebra::UnitQuaternion;
 use std::fmt::Write;
 
@@ -18,8 +21,6 @@ pub struct Mujoco;
 
 /// Step of the simulation, s.
 const STEP: f64 = 1e-3;
-/// Stiffness of a spring that stands for a constant torque, per its torque, 1/rad or 1/m.
-const FAR: f64 = 1e-6;
 /// Least dry friction of a joint whose level a function sets, N m or N: the constraint is there from above zero on.
 const SOME_FRICTION: f64 = 1e-9;
 
@@ -90,9 +91,8 @@ fn free_name(robot: &Robot, mut name: String) -> String {
     name
 }
 
-/// A body that MuJoCo takes: it refuses bodies without mass or with a principal moment of zero, and compares
-/// principal moments without tolerance. One without mass becomes a milligram of a millimetre, one without
-/// moments (a point, a thin rod) gets a radius of 0.03 mm.
+/// A body that MuJoCo takes: it refuses bodies without mass or with a principal moment of zero, and compares moments
+/// without tolerance. One without mass becomes a milligram of a millimetre, a point or thin rod 0.03 mm thick.
 fn solid(inertia: &Inertia) -> Inertia {
     let able = possible(inertia);
     match able.mass() == 0.0 {
@@ -103,22 +103,6 @@ fn solid(inertia: &Inertia) -> Inertia {
         ),
         false => bounded(&able, LEAST, 1e-9 * able.mass()),
     }
-}
-
-/// What stands on a joint.
-#[derive(Debug, Clone, Default)]
-struct OnJoint {
-    armature: f64,
-    /// of `q̇`, `q̇ |q̇|`, `q̇³`
-    damping: [f64; 3],
-    coulomb: f64,
-    /// of `1`, `q`, `q²`, `q³`
-    spring: [f64; 4],
-    /// stiffness, its third power, damping; of a spring that the file states
-    twist: Option<[f64; 3]>,
-    gain: f64,
-    /// s
-    delay: f64,
 }
 
 /// A model in the elements of MuJoCo.
@@ -228,7 +212,17 @@ impl<'a> Parts<'a> {
                 )
             })
         };
-        self.joints.iter().enumerate().filter_map(below).collect()
+        let restless = |(j, on): (usize, &OnJoint)| {
+            on.never_rests().then(|| {
+                format!(
+                    "The spring on {} is not written: its torque is zero nowhere",
+                    robot.joints[j].name
+                )
+            })
+        };
+        let all = || self.joints.iter().enumerate();
+        let below = all().filter_map(below);
+        below.chain(all().filter_map(restless)).collect()
     }
 
     fn text(&self, robot: &Robot) -> String {
@@ -430,75 +424,6 @@ impl<'a> Parts<'a> {
         }
         *out += "  </actuator>\n";
     }
-}
-
-impl OnJoint {
-    fn attributes(&self) -> String {
-        let mut out = String::new();
-        let used = |x: &[f64]| x.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
-        let list = |x: &[f64]| -> String {
-            let all: Vec<String> = x.iter().map(f64::to_string).collect();
-            all.join(" ")
-        };
-        if used(&self.damping) > 0 {
-            let _ = write!(
-                out,
-                " damping=\"{}\"",
-                list(&self.damping[..used(&self.damping)])
-            );
-        }
-        if self.coulomb > 0.0 {
-            let _ = write!(out, " frictionloss=\"{}\"", self.coulomb);
-        }
-        if self.armature > 0.0 {
-            let _ = write!(out, " armature=\"{}\"", self.armature);
-        }
-        if let Some((stiffness, at)) = spring(self.spring) {
-            let stiffness = list(&stiffness[..used(&stiffness)]);
-            let _ = write!(out, " stiffness=\"{stiffness}\" springref=\"{at}\"");
-        }
-        out
-    }
-}
-
-/// A torque `Σ c_k q^k` as a spring: the factors of the first three powers of the way from where it is zero, and
-/// that position. `None` where there is no torque, or none is zero anywhere.
-fn spring(c: [f64; 4]) -> Option<([f64; 3], f64)> {
-    if c == [0.0; 4] {
-        return None;
-    }
-    if c[1..] == [0.0; 3] {
-        return Some(([FAR * c[0].abs(), 0.0, 0.0], -c[0].signum() / FAR));
-    }
-    let value = |q: f64| c[0] + q * (c[1] + q * (c[2] + q * c[3]));
-    let mut reach = 1.0;
-    let (mut low, mut high) = (0.0, 0.0);
-    while value(low) * value(high) > 0.0 || low == high {
-        if reach > 1e9 {
-            return None;
-        }
-        // to the nearer side first
-        (low, high) = if value(0.0) * value(reach) <= 0.0 {
-            (0.0, reach)
-        } else {
-            (-reach, 0.0)
-        };
-        reach *= 1.5;
-    }
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        match value(low) * value(middle) <= 0.0 {
-            true => high = middle,
-            false => low = middle,
-        }
-    }
-    let r = 0.5 * (low + high);
-    let factors = [
-        c[1] + r * (2.0 * c[2] + 3.0 * r * c[3]),
-        c[2] + 3.0 * r * c[3],
-        c[3],
-    ];
-    Some((factors, r))
 }
 
 /// Joints that follow others.

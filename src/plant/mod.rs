@@ -117,7 +117,7 @@ impl From<&Mechanism> for Plant {
 }
 
 impl Plant {
-    /// Reads a robot: the path of a `robot.toml` or `.urdf`, or the name of a bundled one.
+    /// Reads a robot: the path of a `robot.toml`, a `.urdf` or an MJCF, or the name of a bundled one.
     ///
     /// # Errors
     /// As [`Mechanism::load`] and [`Robot::load`].

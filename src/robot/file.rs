@@ -73,7 +73,7 @@ impl Text<'_> {
 }
 
 impl Robot {
-    /// Reads a robot: the path of a `robot.toml` or `.urdf`, or the name of a bundled robot. A file
+    /// Reads a robot: the path of a `robot.toml`, a `.urdf` or an MJCF, or the name of a bundled robot. A file
     /// of that name wins over a bundled robot.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl Robot {
     pub fn load(spec: &str) -> Result<Robot> {
         if spec.trim().is_empty() {
             return Err(Error::Argument(format!(
-                "no robot is named; give a robot.toml, a .urdf, or one of {}",
+                "no robot is named; give a robot.toml, a .urdf, an MJCF, or one of {}",
                 all_bundled().collect::<Vec<_>>().join(", ")
             )));
         }

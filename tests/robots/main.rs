@@ -9,6 +9,7 @@ mod export;
 mod files;
 mod geometry;
 mod identities;
+mod mjcf;
 mod plant;
 mod rank;
 mod reference;

@@ -28,7 +28,7 @@ pub(super) fn simulators(d: &Diagnosis) -> Markup {
         }
         @match rows.is_empty() {
             true => p { "No effect is claimed, so that nothing else is in them." },
-            false => (table(&["effect", "where", "in MuJoCo", "with"], &[2, 3], &rows)),
+            false => (table(&["effect", "where", "in MuJoCo", "with"], &[1, 2, 3], &rows)),
         }
     }
 }

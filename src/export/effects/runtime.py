@@ -157,10 +157,14 @@ def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
         here.memory[data._address] = (0.0, dict(memory))
 
     def forces(x, v, a, time):
-        moved = zip((x, v, a), displacement(x, v, a))
+        _, rate, acceleration = way = displacement(x, v, a)
+        moved = zip((x, v, a), way)
         data.qpos[here.at], data.qvel[here.dof], data.qacc[here.dof] = (s + w for s, w in moved)
         data.time = time
         mujoco.mj_inverse(model, data)
+        # the rotor stands where the encoder reads
+        damping = np.array([np.ravel(model.dof_damping[dof])[0] for dof in here.dof])
+        data.qfrc_inverse[here.dof] -= model.dof_armature[here.dof] * acceleration + damping * rate
         return data.qfrc_inverse
 
     def pushed(x, v, a, time):

@@ -54,6 +54,8 @@ struct Place {
     link: String,
     frame: Frame,
     class: Option<String>,
+    /// whether any joint moves it
+    moves: bool,
     depth: usize,
 }
 
@@ -78,6 +80,7 @@ impl<'a> Reader<'a> {
             link: WORLD.into(),
             frame: Frame::ZERO,
             class: node.own("childclass").map(String::from),
+            moves: false,
             depth: 0,
         };
         self.inside(node, &place)
@@ -174,9 +177,21 @@ impl<'a> Reader<'a> {
         if node.own("mocap") == Some("true") {
             return Ok(());
         }
+        if e.number("gravcomp")?.is_some_and(|x| x != 0.0) {
+            self.warnings.push(Warning::new(
+                WarningKind::EntryIgnored,
+                format!("line {}: body `{name}`", node.line),
+                "`gravcomp` is no part of the model: its weight counts whole",
+            ));
+        }
         let mut joints = Vec::new();
         self.joints_in(node, class.as_deref(), Frame::ZERO, &mut joints)?;
-        let inertia = self.inertia(node, class.as_deref(), &name)?;
+        let moves = place.moves || !joints.is_empty();
+        // that of what stands matters only for the sum of all masses
+        let inertia = match moves || self.compiler.total_mass.is_some() {
+            true => self.inertia(node, class.as_deref(), &name)?,
+            false => Inertia::default(),
+        };
         // the frame of the body on the link that carries it, and the last joint's place on the body
         let (mut parent, mut on, mut anchor) = (place.link.clone(), frame, Vector3::zeros());
         for (k, &(joint, turned)) in joints.iter().enumerate() {
@@ -216,6 +231,7 @@ impl<'a> Reader<'a> {
                 position: -anchor,
             },
             class,
+            moves,
             depth: place.depth + 1,
         };
         self.inside(node, &place)

@@ -48,6 +48,9 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
     for world in root.all("worldbody") {
         reader.world(world)?;
     }
+    if reader.links.is_empty() {
+        return Err(root.error("it has no <worldbody>; name the file that includes this one"));
+    }
     let mut urdf = Urdf {
         name: root.own("model").unwrap_or_default().trim().to_string(),
         file: file.to_path_buf(),
@@ -62,6 +65,12 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
             defaults: None,
         };
         urdf.gravity = e.vector("gravity")?.unwrap_or(urdf.gravity);
+        if node
+            .all("flag")
+            .any(|f| f.own("gravity") == Some("disable"))
+        {
+            urdf.gravity = Vector3::zeros();
+        }
     }
     if let Some(total) = compiler.total_mass {
         let masses = urdf.links.iter().filter_map(|l| l.inertia.as_ref());

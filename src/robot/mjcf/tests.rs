@@ -80,6 +80,7 @@ fn what_is_not_read_is_refused_with_its_line() {
             "",
         ),
         ("<mujoco><worldbody>".into(), "malformed"),
+        ("<mujoco/>".into(), "worldbody"),
     ] {
         match read(&text) {
             Ok(_) => assert!(word.is_empty(), "{text} was read"),
