@@ -273,12 +273,12 @@ impl<'a> Solver<'a> {
         (a, y)
     }
 
-    /// Power over frequency of what the unweighted fit leaves, actuator by actuator in record by record.
+    /// Power over frequency of what a fit leaves, actuator by actuator in record by record.
     ///
     /// # Errors
     /// Signals that are not finite.
-    pub fn power(&self) -> Result<Vec<Vec<f64>>> {
-        Ok(self.solve_with(&|_, _| 1.0, true)?.2)
+    pub fn power(&self, deviation: &dyn Fn(usize, usize) -> f64) -> Result<Vec<Vec<f64>>> {
+        Ok(self.solve_with(deviation, true)?.2)
     }
 
     /// What the unweighted fit makes of other torques, one set a column: values of all columns.

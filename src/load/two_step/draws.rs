@@ -3,12 +3,14 @@
 //! Neither step knows what the one before got wrong: the friction that was taken off, the centre of mass that the second
 //! step takes from the first, noise in the first column of `X₁`. So the whole chain is repeated: friction fit, both steps,
 //! loaded minus empty. Its forces get draws of noise that has the power over frequency of what the fit of each
-//! record leaves (`one_step::spectrum`), so what is left counts as autocorrelated as it is. The covariance is the mean
+//! record leaves (`one_step::spectrum`) and grows towards standstill as that does, so what is left counts as
+//! autocorrelated as it is. The covariance is the mean
 //! square about the estimate: where noise moves the mean, as it does that of `1/m`, the shift is in it.
 
 use super::{PlatformSample, Total, from_quantities, total};
 use crate::error::Result;
-use crate::load::one_step::{Solver, noise_like};
+use crate::load::one_step::{Solver, noise_like, rms};
+use crate::load::weight::Spread;
 use faer::Mat;
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -45,13 +47,26 @@ impl Chain {
     ) -> Result<Self> {
         let part = &solver.system.parts[0];
         let (rows, n) = (part.y.len(), part.count);
-        let power = solver.power()?;
+        // the residual is larger near standstill, where the steps give no weight; power is that of its rest
+        let left = solver.solve(&|_, _| 1.0)?;
+        let spreads: Vec<Spread> = (0..solver.system.actuators)
+            .map(|a| {
+                let own = a * n..(a + 1) * n;
+                let e = &left.residual[0][own.clone()];
+                Spread::fit(e, &part.speed[own], 1e-9 * rms(e))
+            })
+            .collect();
+        let deviation = |i: usize| {
+            let variance = spreads[i / n].variance(part.speed[i]);
+            variance.sqrt().max(f64::MIN_POSITIVE)
+        };
+        let power = solver.power(&|_, i| deviation(i))?;
         let mut r = ChaCha8Rng::seed_from_u64(SEED + record);
         let mut noise = Mat::<f64>::zeros(rows, DRAWS);
         for k in 0..DRAWS {
             for (a, power) in power.iter().enumerate() {
                 for (i, e) in noise_like(power, &mut r).into_iter().enumerate() {
-                    noise[(a * n + i, k)] = e;
+                    noise[(a * n + i, k)] = deviation(a * n + i) * e;
                 }
             }
         }
