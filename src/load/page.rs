@@ -233,7 +233,7 @@ fn methods(found: &Identified) -> Section {
                  Euler's, weighted by the mean piston speed (half of the weight is reached at "
                 (with_unit(0.912 * t.standstill, 2, "m/s")) "). Noise of the forces makes the total mass \
                  of this form too large by about " (significant(100.0 * t.bias, 2)) " %. Both methods \
-                 use the same records and the same refitted friction."
+                 use the same records; friction of these steps is fitted without weights and without a Stribeck term."
             },
             None => p { (found.no_two_step) "." },
         }

@@ -32,10 +32,10 @@ impl Table {
     fn new(plant: &Plant, loaded: bool, seed: u64) -> Table {
         let mut x = Samples::zeros(6, COUNT);
         let home = plant.home().unwrap();
-        for j in 0..6 {
+        for (j, home) in home.iter().enumerate() {
             let size = if j < 3 { 0.03 } else { 0.1 };
             for i in 0..COUNT {
-                x.q[j * COUNT + i] = home[j];
+                x.q[j * COUNT + i] = *home;
                 for h in [1, 2 + j % 3, 5] {
                     let w = std::f64::consts::TAU * h as f64 / 5.0;
                     let angle = w * i as f64 * 0.01 + (3 * j + 7 * h) as f64;
