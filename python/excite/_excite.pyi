@@ -111,6 +111,7 @@ def identify(
     average: bool,
     derive: bool,
     identify: Optional[List[str]],
+    atmosphere: float,
 ) -> Report: ...
 def load(
     experiment: Experiment,
@@ -119,13 +120,14 @@ def load(
     method: str,
     weighted: bool,
     consistent: bool,
+    checked: bool,
     standstill: Optional[float],
     atmosphere: float,
     position_cutoff: Optional[float],
     cutoff: Optional[float],
     flange: List[float],
 ) -> Report: ...
-def diagnose(experiment: Experiment, *, next: bool, next_tries: int, seed: int, progress: _Progress) -> Report: ...
+def diagnose(experiment: Experiment, *, next: bool, next_tries: int, seed: int, atmosphere: float, progress: _Progress) -> Report: ...
 def calibrate(path: Path, *, algorithm: str, orientation: bool) -> Report: ...
 def export(
     text: str,

@@ -72,6 +72,13 @@ def _real(name: str, value: Any) -> float:
         raise unusable(f"{name} must be a number, not {value!r}") from None
 
 
+def _pressure(value: Any) -> float:
+    pressure = _real("atmosphere", value)
+    if not 0 <= pressure < float("inf"):
+        raise unusable(f"atmosphere is a pressure in Pa, not {value}")
+    return pressure
+
+
 def _real_or_none(name: str, value: Any) -> Optional[float]:
     return None if value is None else _real(name, value)
 
@@ -329,6 +336,7 @@ def identify(
     average: bool = True,
     derive: bool = False,
     identify: Optional[Sequence[str]] = None,
+    atmosphere: float = 101_325.0,
 ) -> Identification:
     """Identify the model from recorded runs (``excite identify``).
 
@@ -343,6 +351,7 @@ def identify(
         derive: derive velocities and accelerations from positions even where they were measured.
         identify: joint columns, for all joints: of armature, viscous, coulomb, offset; ``()`` for none; as in the robot
             file where left out.
+        atmosphere: pressure outside of the cylinders, Pa, for records with chamber pressures in place of forces.
     """
     core = as_experiment(experiment)._native
     result = Identification(
@@ -356,6 +365,7 @@ def identify(
             average=bool(average),
             derive=bool(derive),
             identify=None if identify is None else _names("identify", identify),
+            atmosphere=_pressure(atmosphere),
         )
     )
     emit(result.warnings)
@@ -369,6 +379,7 @@ def load(
     method: str = "one-step",
     unweighted: bool = False,
     unconstrained: bool = False,
+    unchecked: bool = False,
     standstill: Optional[float] = None,
     atmosphere: float = 101_325.0,
     position_cutoff: Optional[float] = None,
@@ -386,6 +397,7 @@ def load(
         method: ``"one-step"``, or ``"two-step"`` for platforms.
         unweighted: do not take weight from samples near standstill.
         unconstrained: give the estimate as it is, even if no rigid body could have it.
+        unchecked: go on where the log fits the robot only if it is read otherwise than stated.
         standstill: mean speed at which samples begin to count in the two steps, rad/s or m/s.
         atmosphere: pressure outside of the cylinders, Pa.
         position_cutoff, cutoff: of the filters, Hz; ``inf`` for none.
@@ -401,9 +413,6 @@ def load(
     for what, value in positive.items():
         if value is not None and not _real(what, value) > 0:
             raise unusable(f"{what} must be positive, not {value}")
-    pressure = _real("atmosphere", atmosphere)
-    if not 0 <= pressure < float("inf"):
-        raise unusable(f"atmosphere is a pressure in Pa, not {atmosphere}")
     result = Load(
         _excite.load(
             core,
@@ -411,8 +420,9 @@ def load(
             method=str(method).replace("-", "_"),
             weighted=not unweighted,
             consistent=not unconstrained,
+            checked=not unchecked,
             standstill=_real_or_none("standstill", standstill),
-            atmosphere=pressure,
+            atmosphere=_pressure(atmosphere),
             position_cutoff=_real_or_none("position_cutoff", position_cutoff),
             cutoff=_real_or_none("cutoff", cutoff),
             flange=[0.0] * 6 if flange is None else vector("flange", flange, 6).tolist(),
@@ -429,6 +439,7 @@ def diagnose(
     next: bool = True,
     next_tries: int = 64,
     seed: int = 1,
+    atmosphere: float = 101_325.0,
     progress: Progress = None,
 ) -> Diagnosis:
     """Diagnose the gap between a model and its robot: where it lies, which effect causes it, how far it shrinks, what to
@@ -438,6 +449,7 @@ def diagnose(
         next: whether the next motion is designed.
         next_tries: random steps by which the best design of it is improved.
         seed: of its random starts.
+        atmosphere: pressure outside of the cylinders, Pa, for records with chamber pressures in place of forces.
         progress: as for :func:`design`.
     """
     core = as_experiment(experiment)._native
@@ -447,6 +459,7 @@ def diagnose(
             next=bool(next),
             next_tries=_integer("next_tries", next_tries),
             seed=_integer("seed", seed),
+            atmosphere=_pressure(atmosphere),
             progress=bar.report,
         )
     result = Diagnosis(report)

@@ -67,6 +67,24 @@ fn purpose(holdout: bool) -> Purpose {
     }
 }
 
+impl Experiment {
+    /// A copy that may be changed.
+    pub fn owned(&self) -> log::Experiment {
+        let log::Experiment {
+            path,
+            spec,
+            plant,
+            records,
+        } = &*self.core;
+        log::Experiment {
+            path: path.clone(),
+            spec: spec.clone(),
+            plant: plant.clone(),
+            records: records.clone(),
+        }
+    }
+}
+
 #[pymethods]
 impl Experiment {
     /// Reads an `experiment.toml`.

@@ -30,7 +30,7 @@ fn texts(all: Vec<(&'static str, Result<String>)>) -> Vec<(String, String)> {
 /// Identifies the model.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
-#[pyo3(signature = (experiment, *, method, consistency, prior, cutoff, position_cutoff, average, derive, identify))]
+#[pyo3(signature = (experiment, *, method, consistency, prior, cutoff, position_cutoff, average, derive, identify, atmosphere))]
 pub fn identify(
     py: Python<'_>,
     experiment: &Experiment,
@@ -42,8 +42,9 @@ pub fn identify(
     average: bool,
     derive: bool,
     identify: Option<Vec<String>>,
+    atmosphere: f64,
 ) -> PyResult<Report> {
-    let core = experiment.core.clone();
+    let mut core = experiment.owned();
     let settings = identification::Settings {
         method: named("method", &method)?,
         consistency: named("consistency", &consistency)?,
@@ -58,6 +59,7 @@ pub fn identify(
     };
     simply(py, move |_| {
         let begin = Instant::now();
+        core.press(atmosphere)?;
         let mut notes = excite::survey::check(&core.plant, &core.records)?;
         let plant = terms::columns(core.plant.clone(), identify.as_deref(), &mut notes)?;
         let mut id = identification::identify(&plant, &core.records, &settings)?;
@@ -90,7 +92,7 @@ pub fn identify(
 /// Identifies the load.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
-#[pyo3(signature = (experiment, *, parameters, method, weighted, consistent, standstill, atmosphere, position_cutoff, cutoff, flange))]
+#[pyo3(signature = (experiment, *, parameters, method, weighted, consistent, checked, standstill, atmosphere, position_cutoff, cutoff, flange))]
 pub fn load(
     py: Python<'_>,
     experiment: &Experiment,
@@ -98,6 +100,7 @@ pub fn load(
     method: String,
     weighted: bool,
     consistent: bool,
+    checked: bool,
     standstill: Option<f64>,
     atmosphere: f64,
     position_cutoff: Option<f64>,
@@ -110,6 +113,7 @@ pub fn load(
         method: named("method", &method)?,
         weighted,
         consistent,
+        checked,
         standstill,
         atmosphere,
         flange,
@@ -145,16 +149,17 @@ pub fn load(
 
 /// Diagnoses the gap.
 #[pyfunction]
-#[pyo3(signature = (experiment, *, next, next_tries, seed, progress))]
+#[pyo3(signature = (experiment, *, next, next_tries, seed, atmosphere, progress))]
 pub fn diagnose(
     py: Python<'_>,
     experiment: &Experiment,
     next: bool,
     next_tries: usize,
     seed: u64,
+    atmosphere: f64,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
-    let core = experiment.core.clone();
+    let mut core = experiment.owned();
     let settings = diagnosis::Settings {
         next,
         next_tries: next_tries.min(10_000),
@@ -162,6 +167,7 @@ pub fn diagnose(
     };
     let work = move |reporter: &Reporter| {
         let begin = Instant::now();
+        core.press(atmosphere)?;
         let tell = |step: &str| reporter.tell(0.0, 0.0, step);
         let mut d = diagnosis::diagnose(&core, &settings, &tell)?;
         let model = Model {

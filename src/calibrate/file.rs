@@ -369,9 +369,9 @@ fn optics(folder: &Path, entry: &Entry) -> Result<Option<Optics>> {
     };
     let distortion = [camera.k1, camera.k2, camera.p1, camera.p2, camera.k3];
     let all = [camera.cx, camera.cy].into_iter().chain(distortion);
-    if !(camera.fx > 0.0 && camera.fy > 0.0)
-        || !all.chain([camera.fx, camera.fy]).all(f64::is_finite)
-    {
+    let able =
+        camera.fx > 0.0 && camera.fy > 0.0 && all.chain([camera.fx, camera.fy]).all(f64::is_finite);
+    if !able {
         return wrong("camera: fx and fy must be positive, and all numbers finite".into());
     }
     let std = entry.std.unwrap_or(PIXEL_STD);

@@ -774,5 +774,5 @@ fn an_h4_is_calibrated_from_the_pixels_of_its_pictures() {
         Err(e) => e.to_string(),
         Ok((c, _)) => format!("{:?}", c.warnings),
     };
-    assert!(said.contains("pixels"), "{said}");
+    assert!(said.contains("pictures"), "{said}");
 }
