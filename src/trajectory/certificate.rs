@@ -261,7 +261,7 @@ pub struct Certificate {
     /// the tool point, where it has limits
     #[serde(default)]
     pub tool: Option<ToolCertificate>,
-    /// whether every limit holds (to [`TOLERANCE`] of its range)
+    /// whether every limit holds (to 1e-9 of its range)
     pub satisfied: bool,
     /// the most used limit; `None` where there are no limits
     pub worst: Option<Worst>,
@@ -358,7 +358,7 @@ impl Certificate {
 /// ```
 ///
 /// # Errors
-/// [`Error::Argument`] if the trajectory is malformed or has another number of joints than the
+/// [`Error::Argument`](crate::Error::Argument) if the trajectory is malformed or has another number of joints than the
 /// robot.
 pub fn certify(robot: &Robot, trajectory: &Fourier) -> Result<Certificate> {
     check(robot, trajectory)?;
