@@ -135,7 +135,9 @@ def verify(
         found = Diagnosis.read(found)
     if found is None:
         with Bar(progress, "diagnose") as bar:
-            report = _excite.diagnose(core, next=False, next_tries=0, seed=1, progress=bar.report)
+            report = _excite.diagnose(
+                core, next=False, next_tries=0, seed=1, atmosphere=101_325.0, progress=bar.report
+            )
         found = Diagnosis(report)
     if found.to_dict()["joints"] != robot.joints:
         raise unusable("the diagnosis is of another robot than the experiment")
