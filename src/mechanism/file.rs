@@ -12,8 +12,9 @@ mod loops;
 
 use super::{Mechanism, bundled};
 use crate::error::{Error, Result};
+use crate::robot::file::Text;
 use crate::robot::file::names::did_you_mean;
-use crate::robot::file::{Text, read_text};
+use crate::robot::file::text::read_text;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 

@@ -3,25 +3,23 @@
 pub(crate) mod joint;
 pub(crate) mod names;
 mod template;
+pub(crate) mod text;
 mod tool;
 
 use super::geometry::{CollisionEntry, Entries, KeepInEntry, ShapeEntry};
 use super::urdf::{Options, Urdf};
-use super::{Prior, Robot, bundled};
+use super::{Prior, Robot, bundled, mjcf};
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, HashMap};
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
+use text::read_text;
 use toml::Spanned;
 
 use joint::{JointEntry, joint_values, stated_limits};
 use names::{did_you_mean, listed};
-
-/// Largest robot file that is read, bytes.
-pub const MAX_BYTES: u64 = 64 << 20;
 
 /// `robot.toml` as written.
 #[derive(Debug, Deserialize)]
@@ -174,39 +172,6 @@ fn all_bundled() -> impl Iterator<Item = &'static str> {
     bundled::names().into_iter().chain(bundled::PARALLEL)
 }
 
-/// The file at this path, as text.
-pub(crate) fn read_text(path: &Path) -> Result<String> {
-    let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| Error::io(path, e))?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(Error::file(
-            path,
-            "",
-            format!(
-                "larger than {} MiB: this is not a robot file",
-                MAX_BYTES >> 20
-            ),
-        ));
-    }
-    String::from_utf8(bytes).map_err(|e| {
-        let valid = e.utf8_error().valid_up_to();
-        let line = 1 + e
-            .as_bytes()
-            .iter()
-            .take(valid)
-            .filter(|b| **b == b'\n')
-            .count();
-        Error::file(
-            path,
-            format!("line {line}"),
-            "it is not UTF-8 text; save it as UTF-8",
-        )
-    })
-}
-
 fn load_path(path: &Path) -> Result<Robot> {
     let text = read_text(path)?;
     let source = Text {
@@ -278,8 +243,19 @@ fn load_path(path: &Path) -> Result<Robot> {
     Ok(robot)
 }
 
+/// Links and joints of a URDF, or of an MJCF, told apart by the root element; `file` is what errors call it.
+///
+/// # Errors
+/// Those of the format.
+pub(crate) fn described(text: &str, file: &Path) -> Result<Urdf> {
+    match mjcf::is(text) {
+        true => mjcf::read(text, file),
+        false => Urdf::parse(text, file),
+    }
+}
+
 fn from_urdf(source: Text) -> Result<Robot> {
-    let urdf = Urdf::parse(source.text, source.file)?;
+    let urdf = described(source.text, source.file)?;
     let mut robot = urdf.robot(&Options::default())?;
     if robot.name.is_empty() {
         robot.name = file_stem(source.file);
@@ -316,7 +292,7 @@ fn refuse_mechanism(source: Text, table: &toml::Table) -> Result<()> {
 
 /// The robot of `urdf` with what `file` states.
 fn apply(source: Text, file: &RobotFile, urdf: Text) -> Result<Robot> {
-    let tree = Urdf::parse(urdf.text, urdf.file)?;
+    let tree = described(urdf.text, urdf.file)?;
     let names: Vec<&str> = tree.joint_names().collect();
     let unknown = |name: &str, at: usize, what: &str| {
         source.error(

@@ -70,17 +70,13 @@ pub struct Urdf {
 pub(super) const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 
 impl Urdf {
-    /// Reads the text of a URDF, or of an [MJCF](super::mjcf), told apart by the root element; `file` is what errors
-    /// call it.
+    /// Reads the text of a URDF; `file` is what errors call it.
     ///
     /// # Errors
     /// Malformed XML, an unexpanded xacro, a root other than `<robot>`, missing or duplicate
     /// names, a joint without type, parent or child, numbers that are not finite.
     pub fn parse(text: &str, file: &Path) -> Result<Self> {
-        match super::mjcf::is(text) {
-            true => super::mjcf::read(text, file),
-            false => read::read(text, file),
-        }
+        read::read(text, file)
     }
 
     /// The tree of moving bodies, with the standard gravity and no joint columns to identify.

@@ -11,8 +11,8 @@ use crate::mechanism::Mechanism;
 use crate::mechanism::loops::Loops;
 use crate::mechanism::loops::yaml;
 use crate::robot::file::names::{did_you_mean, listed};
-use crate::robot::file::{Text, read_text};
-use crate::robot::urdf::Urdf;
+use crate::robot::file::text::read_text;
+use crate::robot::file::{Text, described};
 use closure::{LoopEntry, Names, closure, from_yaml};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -76,7 +76,7 @@ pub(super) fn read(source: Text, folder: &Path) -> Result<Mechanism> {
         }
         lock.insert(name.clone(), *value.get_ref());
     }
-    let urdf = Urdf::parse(&urdf_text, &urdf_path)?;
+    let urdf = described(&urdf_text, &urdf_path)?;
     for (name, value) in &file.lock {
         if !urdf.joint_names().any(|n| n == name) {
             return Err(source.error(

@@ -138,18 +138,25 @@ impl<'a> Reader<'a> {
     }
 
     /// The place that a `<frame>` makes.
-    fn framed(&self, node: &Node, place: &Place) -> Result<Place> {
+    /// Pose of a `<frame>` or a body, and the class of defaults inside.
+    fn frame<'c>(
+        &self,
+        node: &'c Node,
+        class: Option<&'c str>,
+    ) -> Result<(Matrix3<f64>, Vector3<f64>, Option<&'c str>)> {
         let e = Element {
             node,
             defaults: None,
         };
         let (rotation, position) = self.pose(&e)?;
+        Ok((rotation, position, node.own("childclass").or(class)))
+    }
+
+    fn framed(&self, node: &Node, place: &Place) -> Result<Place> {
+        let (rotation, position, class) = self.frame(node, place.class.as_deref())?;
         Ok(Place {
             frame: place.frame.then(&rotation, &position),
-            class: node
-                .own("childclass")
-                .map(String::from)
-                .or(place.class.clone()),
+            class: class.map(String::from),
             depth: place.depth + 1,
             ..place.clone()
         })
@@ -262,12 +269,7 @@ impl<'a> Reader<'a> {
                     out.push((e, frame));
                 }
                 "frame" => {
-                    let e = Element {
-                        node: child,
-                        defaults: None,
-                    };
-                    let (rotation, position) = self.pose(&e)?;
-                    let class = child.own("childclass").or(class);
+                    let (rotation, position, class) = self.frame(child, class)?;
                     self.joints_in(child, class, frame.then(&rotation, &position), out)?;
                 }
                 _ => {}
@@ -310,12 +312,7 @@ impl<'a> Reader<'a> {
                     }
                 }
                 "frame" => {
-                    let e = Element {
-                        node: child,
-                        defaults: None,
-                    };
-                    let (rotation, position) = self.pose(&e)?;
-                    let class = child.own("childclass").or(class);
+                    let (rotation, position, class) = self.frame(child, class)?;
                     let inner = self.of_geoms(child, class, name)?;
                     sum = sum + inner.in_parent(&rotation, &position);
                 }

@@ -155,7 +155,7 @@ fn convert(
         }
         // relative to the file that is loaded
         let path = folder.join(name);
-        let text = crate::robot::file::read_text(&path)
+        let text = crate::robot::file::text::read_text(&path)
             .map_err(|e| child.error(format!("cannot read {}: {e}", path.display())))?;
         let included = one(&text, &path, folder, depth + 1)?;
         out.children.extend(included.children);
