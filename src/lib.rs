@@ -88,6 +88,7 @@ pub mod identify;
 pub mod load;
 pub mod log;
 pub mod mechanism;
+mod median;
 pub mod moves;
 #[doc(hidden)]
 pub mod output;

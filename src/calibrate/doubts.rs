@@ -2,7 +2,7 @@
 
 use super::file::Calibration;
 use super::frame::Frame;
-use super::judge::{self, Errors};
+use super::judge::Errors;
 use crate::error::{Error, Result, Warning, WarningKind};
 
 /// Rows whose joint readings no pose gives are left out, with a warning; too many of them are an error.
@@ -52,7 +52,7 @@ pub(super) fn suspicious(input: &Calibration, before: &Errors, warnings: &mut Ve
             .filter(|(r, _)| r.measurement == m)
             .map(|(_, e)| *e)
             .collect();
-        let typical = judge::middle(&own);
+        let typical = crate::median::median(own.iter().copied());
         if typical > 0.05 {
             warnings.push(Warning::new(
                 WarningKind::UnitSuspect,

@@ -39,16 +39,6 @@ impl Stats {
     }
 }
 
-/// Middle of a list; not a number of none.
-pub fn middle(list: &[f64]) -> f64 {
-    let mut l: Vec<f64> = list.iter().copied().filter(|x| x.is_finite()).collect();
-    l.sort_by(f64::total_cmp);
-    match l.len() {
-        0 => f64::NAN,
-        n => l[n / 2],
-    }
-}
-
 /// Errors by row. Where a posture cannot be taken they are not numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Errors {
@@ -164,7 +154,7 @@ pub fn strays(model: &Model, errors: &Errors) -> (Vec<Group>, Vec<usize>) {
             .filter(|&i| of[i] == g)
             .map(|i| errors.robust[i] / median_length(dims(i)))
             .collect();
-        middle(&list)
+        crate::median::median(list.iter().copied())
     };
     let levels: Vec<f64> = (0..names.len()).map(level).collect();
     let mut groups = Vec::new();
@@ -177,7 +167,8 @@ pub fn strays(model: &Model, errors: &Errors) -> (Vec<Group>, Vec<usize>) {
         groups.push(Group {
             name: name.clone(),
             fit,
-            spoiled: others.len() >= 2 && levels[g] > SPOILED * middle(&others),
+            spoiled: others.len() >= 2
+                && levels[g] > SPOILED * crate::median::median(others.iter().copied()),
             noise: levels[g],
         });
     }
@@ -186,7 +177,7 @@ pub fn strays(model: &Model, errors: &Errors) -> (Vec<Group>, Vec<usize>) {
         .filter(|g| !g.spoiled)
         .map(|g| g.noise)
         .collect();
-    let usual = middle(&sound);
+    let usual = crate::median::median(sound.iter().copied());
     let rows = (0..of.len())
         .filter(|&i| {
             let g = &groups[of[i]];

@@ -10,6 +10,7 @@
 //! that are fitted; the rows held out judge the result and nothing else.
 
 mod actuators_at;
+mod cells;
 mod doubts;
 mod effects;
 mod feature;

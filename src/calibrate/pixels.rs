@@ -12,6 +12,7 @@
 //! The pose minimises the squares of the deviations, from 24 orientations, so that the mirror pose of a plane target is
 //! found too and refused where it fits as well. With the noise `σ` of a coordinate its covariance is `σ² (JᵀJ)⁻¹`.
 
+use super::cells::{lines, split};
 use super::frame::{Frame, exp};
 use crate::error::{Error, Result};
 use nalgebra::{Matrix2x3, Matrix3, Matrix6, Vector2, Vector3, Vector6};
@@ -125,13 +126,8 @@ impl Optics {
     pub fn points(path: &Path) -> Result<Vec<Vector3<f64>>> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
         let mut points = Vec::new();
-        let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
-        for (i, line) in lines {
-            let line = line.trim();
-            if line.is_empty() || line.starts_with('#') {
-                continue;
-            }
-            let cells: Vec<&str> = line.split([',', ';']).map(str::trim).collect();
+        for (number, line) in lines(&text) {
+            let cells = split(line);
             let numbers: Vec<f64> = cells.iter().filter_map(|c| c.parse().ok()).collect();
             if numbers.is_empty() && points.is_empty() {
                 continue; // header
@@ -140,7 +136,7 @@ impl Optics {
             if !finite || !(2..=3).contains(&numbers.len()) {
                 return Err(Error::file(
                     path,
-                    format!("line {}", i + 1),
+                    format!("line {number}"),
                     "a point of the target is x, y or x, y, z in m",
                 ));
             }
@@ -203,7 +199,7 @@ impl Optics {
         while let Some(&(_, pose, _)) = found.first() {
             let off: Vec<f64> = pairs.iter().map(|p| self.deviation(p, &pose)).collect();
             // of a Rayleigh distribution the median is 1.18 standard deviations
-            let noise = (super::judge::middle(&off) / 1.18).max(self.std);
+            let noise = (crate::median::median(off.iter().copied()) / 1.18).max(self.std);
             let (worst, far) = (off.iter().enumerate())
                 .map(|(i, d)| (i, *d))
                 .max_by(|a, b| a.1.total_cmp(&b.1))

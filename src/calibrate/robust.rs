@@ -109,7 +109,8 @@ pub(super) fn robustly(model: &mut Model, plan: &mut Plan, x: &[f64]) -> Result<
         let count: usize = lengths.iter().flatten().map(|l| l.1).sum();
         // parameters take their share of the residuals; where there are few rows, half at most
         let taken = plan.free.iter().filter(|f| **f).count().min(count / 2);
-        let found = judge::middle(&scaled) * (count as f64 / (count - taken).max(1) as f64).sqrt();
+        let found = crate::median::median(scaled.iter().copied())
+            * (count as f64 / (count - taken).max(1) as f64).sqrt();
         let before = model.noise;
         let new = (before * found).max(match model.input.noise_stated {
             true => 1.0,

@@ -2,6 +2,7 @@
 //!
 //! Without a header the columns are the joint readings, then those of [`Kind::columns`].
 
+use super::cells::{lines, split};
 use super::frame::Frame;
 use super::kind::{Kind, Purpose};
 use super::pixels::Optics;
@@ -63,25 +64,8 @@ pub fn read(
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Row>> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let bad = |line: usize, message: String| Error::file(path, format!("line {line}"), message);
-    let split = |l: &str| -> Vec<String> {
-        let cells: Vec<&str> = match (l.contains(','), l.contains(';')) {
-            (true, _) => l.split(',').collect(),
-            (_, true) => l.split(';').collect(),
-            _ => l.split_whitespace().collect(),
-        };
-        cells
-            .iter()
-            .map(|c| c.trim().trim_matches('"').to_string())
-            .collect()
-    };
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(i, l)| (i + 1, l.trim()))
-        .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
-        .peekable();
+    let mut lines = lines(&text).peekable();
     let Some((_, first)) = lines.peek() else {
         return Err(Error::file(
             path,
@@ -305,14 +289,14 @@ pub fn read(
         );
     }
     if let Some(o) = optics
-        && super::judge::middle(&rough) > ROUGH * o.std
+        && crate::median::median(rough.iter().copied()) > ROUGH * o.std
     {
         warn(
             WarningKind::UnitSuspect,
             format!(
                 "poses leave {} pixels of the points, {} are stated: camera or target are not quite those of the pictures, \
                  and what follows from them is worse than it says",
-                crate::error::number(super::judge::middle(&rough)),
+                crate::error::number(crate::median::median(rough.iter().copied())),
                 crate::error::number(o.std)
             ),
         );

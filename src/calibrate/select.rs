@@ -269,7 +269,7 @@ fn folds(input: &Calibration) -> Vec<Option<usize>> {
 
 /// Pairwise; rows that are far off either way do not decide.
 fn compare(effect: &'static str, without: &[f64], with: &[f64]) -> Trial {
-    let typical = judge::middle(without);
+    let typical = crate::median::median(without.iter().copied());
     let pairs: Vec<(f64, f64)> = without
         .iter()
         .zip(with)

@@ -4,6 +4,9 @@
 //! says which of these it has ([`Format::element`](super::Format::element)). What no format has an element for is a
 //! [`Function`], which `effects.py` holds.
 
+/// Name of the file of functions.
+pub const FUNCTIONS: &str = "effects.py";
+
 /// A part of a machine. Joints are coordinates of [`Robot::joints`](crate::Robot::joints); torques are those that
 /// the drive has to make.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -128,6 +131,14 @@ pub(crate) fn py(x: f64) -> String {
 }
 
 impl Element {
+    /// Whether it is a function of `effects.py`, at least for inverse dynamics.
+    pub fn is_function(&self) -> bool {
+        !matches!(
+            self,
+            Element::Drag { .. } | Element::Spring { .. } | Element::Coupling { .. }
+        )
+    }
+
     /// Dry friction of a level, an expression in `q`, `dq` and `load`.
     pub(crate) fn dry(joint: usize, width: f64, level: String) -> Element {
         Element::torque(joint, width, vec![format!("return {level}, 0.0")])

@@ -18,6 +18,7 @@ pub mod mechanism;
 pub(crate) mod mujoco;
 pub(crate) mod remark;
 pub(crate) mod robot_toml;
+pub(crate) mod simulator;
 #[doc(hidden)]
 pub mod urdf;
 

@@ -1,7 +1,7 @@
 //! Channels that cannot be what was measured: saturated, stuck, dropped, in other units.
 
-use super::clock::median;
 use crate::error::{Warning, WarningKind};
+use crate::median::median;
 use crate::robot::{Joint, Motion};
 use std::f64::consts::PI;
 

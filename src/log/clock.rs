@@ -12,6 +12,7 @@
 //! | a gap | interpolated over so that filters run through, but marked as not measured |
 
 use crate::error::{Warning, WarningKind};
+use crate::median::median;
 
 /// Stamps after repair.
 #[derive(Debug, Clone, Default)]
@@ -43,16 +44,6 @@ const FILLED: f64 = 10.0;
 const CLOSED: f64 = 10.0;
 /// Stamps larger than this are no times (a clock of nanoseconds is at 2e18).
 const LARGEST: f64 = 1e21;
-
-/// Median of numbers (of a copy, by selection).
-pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut v: Vec<f64> = values.filter(|x| x.is_finite()).collect();
-    if v.is_empty() {
-        return f64::NAN;
-    }
-    let k = v.len() / 2;
-    *v.select_nth_unstable_by(k, f64::total_cmp).1
-}
 
 /// Counters that wrap: modulus and name.
 fn counter(jump: f64) -> Option<&'static str> {

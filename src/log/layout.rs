@@ -84,12 +84,12 @@ pub(crate) struct Layout {
 
 /// Factor that makes stamps seconds, from their size and their usual step, with its name.
 pub(crate) fn time_unit(t: &[f64]) -> (f64, &'static str) {
-    let step = super::clock::median(
+    let step = crate::median::median(
         t.windows(2)
             .map(|w| w[1] - w[0])
             .filter(|d| d.is_finite() && *d > 0.0),
     );
-    let first = super::clock::median(t.iter().copied().filter(|x| x.abs() < 1e21));
+    let first = crate::median::median(t.iter().copied().filter(|x| x.abs() < 1e21));
     // the time since 1970, between 2001 and 2100
     for (factor, name) in [(1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns")] {
         let since = first * factor;

@@ -13,31 +13,34 @@ const STATES: (usize, u64) = (100, 0x11_67);
 /// and armature that the model lacks are as large.
 const LIGHT: f64 = 0.05;
 
-/// Whether the model's torques of a joint are small beside those of the others.
-fn light(plant: &Plant, j: usize) -> bool {
+/// Joints whose torques by the model are small beside those of the others.
+fn light(plant: &Plant) -> Vec<bool> {
     let states = plant.random_states(STATES.0, STATES.1);
     let Ok(torque) = plant.nominal_torque(&states) else {
-        return true;
+        return vec![true; plant.actuators().len()];
     };
     let power: Vec<f64> = torque
         .chunks(states.count.max(1))
         .map(|of| of.iter().map(|x| x * x).sum())
         .collect();
     let largest = power.iter().copied().fold(0.0, f64::max);
-    power.get(j).is_none_or(|p| *p < LIGHT * LIGHT * largest)
+    power.iter().map(|p| *p < LIGHT * LIGHT * largest).collect()
 }
 
 /// The best hypothesis with the stated sign of each joint whose turned sign alone is not as clear as a contradiction
 /// must be: of a light joint, friction that is not that of the model decides it.
 fn settled(problem: &Problem, stated: &Hypothesis, best: &Hypothesis, plant: &Plant) -> Hypothesis {
     let mut out = best.clone();
-    for j in 0..stated.sign.len() {
+    if stated == best {
+        return out;
+    }
+    for (j, light) in light(plant).into_iter().enumerate() {
         if out.column[j] != stated.column[j] || out.sign[j] == stated.sign[j] {
             continue;
         }
         let mut back = out.clone();
         back.sign[j] = stated.sign[j];
-        if light(plant, j) || !contradicts(problem, &out, &back) {
+        if light || !contradicts(problem, &out, &back) {
             out = back;
         }
     }

@@ -130,7 +130,7 @@ fn look(
     };
     // an order that explains little is a local optimum or another robot
     let shares = problem.shares(best);
-    let middle = crate::log::clock::median(shares.iter().copied());
+    let middle = crate::median::median(shares.iter().copied());
     if !stated_all && middle < WHOLE {
         warnings.push(Warning::new(
             WarningKind::UnitSuspect,

@@ -5,11 +5,12 @@ use super::file_name;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Table;
 use crate::log::channels;
-use crate::log::clock::{self, median};
+use crate::log::clock;
 use crate::log::formats::Format;
 use crate::log::layout::{Layout, Place, Time, time_unit};
 use crate::log::record::impossible;
 use crate::log::resample::{Order, fill, interpolate};
+use crate::median::median;
 use crate::plant::Plant;
 use std::path::PathBuf;
 

@@ -85,7 +85,7 @@ impl Smooth {
             // the median: jumps of friction are no noise
             let bends = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
             let spread_of = (whole / y.len() as f64).sqrt();
-            out.grain.push(crate::log::clock::median(bends) / spread_of);
+            out.grain.push(crate::median::median(bends) / spread_of);
             let slope = first_derivative(&low, frame.step);
             out.value.push(low.into_iter().step_by(each).collect());
             out.rate.push(slope.into_iter().step_by(each).collect());

@@ -261,7 +261,7 @@ impl Poses {
 
     /// Middle of the random draws, m.
     pub fn random_middle(&self) -> f64 {
-        super::judge::middle(&self.random)
+        crate::median::median(self.random.iter().copied())
     }
 
     /// `report.json`.

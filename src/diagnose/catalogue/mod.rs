@@ -47,7 +47,7 @@ use super::column::Column;
 use super::thresholds::THRESHOLDS as T;
 use crate::dynamics::Samples;
 use crate::export::element::{Element, Kind, py};
-use crate::export::{Form, Part, remark};
+use crate::export::{Form, Part, simulator};
 use crate::plant;
 use crate::robot::{Inertia, JointTerm, Motion, Robot};
 use crate::signals::series::Series;
@@ -185,7 +185,7 @@ pub fn all() -> Vec<Box<dyn Effect>> {
 pub(crate) fn in_mujoco(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Form {
     let plant = cx.data.plant;
     let held = effect.apply(cx, e, &mut plant.robot().clone());
-    remark::in_mujoco(plant, held, effect.element(cx, e).as_ref())
+    simulator::in_mujoco(plant, held, effect.element(cx, e).as_ref())
 }
 
 /// Adds an effect of one coefficient to a term of its joint.

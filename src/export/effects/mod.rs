@@ -3,7 +3,7 @@
 //! The file needs NumPy, and MuJoCo where it is installed in a model; nothing of excite. Its functions are pure,
 //! and take the array module (NumPy, JAX, Torch) as an argument.
 
-use super::element::{Element, Function, Kind, py};
+use super::element::{Element, FUNCTIONS, Function, Kind, py};
 use super::mujoco::{Mujoco, base_joints, twist_joint};
 use super::{Form, Format, Model, Part, Remark};
 use crate::error::Result;
@@ -11,9 +11,6 @@ use crate::plant::Plant;
 use crate::robot::{Motion, Robot};
 use serde_json::json;
 use std::fmt::Write;
-
-/// Name of the file.
-pub const FILE: &str = "effects.py";
 
 /// Speed over which the sign of a velocity turns where no effect says it, over the largest speed.
 const SHARP: f64 = 1e-3;
@@ -26,11 +23,11 @@ pub struct Effects;
 
 impl Format for Effects {
     fn name(&self) -> &'static str {
-        "effects.py"
+        FUNCTIONS
     }
 
     fn file(&self) -> &'static str {
-        FILE
+        FUNCTIONS
     }
 
     fn holds(&self, plant: &Plant) -> bool {
@@ -42,15 +39,15 @@ impl Format for Effects {
     }
 
     fn element(&self, element: &Element) -> Form {
-        match element {
-            Element::Drag { .. } | Element::Spring { .. } | Element::Coupling { .. } => Form::None,
-            _ => Form::Callback,
+        match element.is_function() {
+            true => Form::Callback,
+            false => Form::None,
         }
     }
 
     fn needed(&self, model: &Model) -> bool {
         let elements = model.remarks.iter().filter_map(|r| r.element.as_ref());
-        elements.into_iter().any(|e| self.element(e) != Form::None)
+        elements.into_iter().any(Element::is_function)
     }
 
     fn write(&self, model: &Model) -> Result<String> {
