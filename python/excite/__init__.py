@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ._command import Command
-    from ._errors import Error, ExciteWarning, Interrupted, Notice
+    from ._errors import Error, ExciteWarning, Notice
     from ._excite import __version__
     from ._posterior import Posterior
     from ._records import Experiment, Record
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         Diagnosis,
         Export,
         Identification,
+        Interrupted,
         Load,
         Result,
         Simulation,
@@ -51,11 +52,14 @@ if TYPE_CHECKING:
 #: What is imported when it is used first: NumPy takes longer than all of this package.
 _PARTS = {
     "_command": ("Command",),
-    "_errors": ("Error", "ExciteWarning", "Interrupted", "Notice"),
+    "_errors": ("Error", "ExciteWarning", "Notice"),
     "_excite": ("__version__",),
     "_posterior": ("Posterior",),
     "_records": ("Experiment", "Record"),
-    "_results": ("Assessment", "Calibration", "Design", "Diagnosis", "Export", "Identification", "Load", "Result", "Simulation"),
+    "_results": (
+        "Assessment", "Calibration", "Design", "Diagnosis", "Export", "Identification", "Interrupted", "Load", "Result",
+        "Simulation",
+    ),
     "_robot": ("BaseParameters", "Parameter", "Robot"),
     "_trajectory": ("Motion", "Samples", "Trajectory"),
     "_verbs": ("assess", "calibrate", "design", "diagnose", "export", "formats", "identify", "load", "robots", "simulate"),

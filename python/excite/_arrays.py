@@ -12,6 +12,15 @@ from ._errors import unusable
 Array = npt.NDArray[np.float64]
 
 
+def pandas() -> Any:
+    """pandas, or how to get it."""
+    try:
+        import pandas as found
+    except ImportError:
+        raise unusable("frames need pandas: pip install pandas") from None
+    return found
+
+
 def numbers(name: str, value: Any) -> Array:
     """``value`` as an array of float64; complex numbers, text and ragged lists are refused."""
     try:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Iterable, NamedTuple, Optional
+from typing import Iterable, NamedTuple
 
 from ._excite import Error
 
-if TYPE_CHECKING:
-    from ._results import Design
-
-__all__ = ["Error", "ExciteWarning", "Interrupted", "Notice"]
+__all__ = ["Error", "ExciteWarning", "Notice"]
 
 #: Warnings of one call that are shown one by one.
 _MOST = 12
@@ -32,17 +29,6 @@ class Notice(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.subject}: {self.message}"
-
-
-class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a design; the best trajectory so far is kept."""
-
-    best: Optional["Design"]
-    """the design with the best trajectory that was found until then"""
-
-    def __init__(self, best: Optional["Design"] = None) -> None:
-        super().__init__("interrupted; the best trajectory so far is in .best")
-        self.best = best
 
 
 def unusable(text: str) -> Error:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple, Union
 import numpy as np
 
 from . import _excite
-from ._arrays import Array, from_columns
+from ._arrays import Array, from_columns, pandas
 from ._errors import unusable
 from ._robot import PathLike, Robot
 
@@ -91,8 +91,6 @@ class Posterior:
 
     def to_frame(self) -> Any:
         """One row a sample as a pandas ``DataFrame``."""
-        from ._results import pandas
-
         return pandas().DataFrame(self.values, columns=self.names)
 
     def save(self, folder: PathLike, *, force: bool = False) -> List[Path]:

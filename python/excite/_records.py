@@ -10,7 +10,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import _excite
-from ._arrays import Array, columns, numbers
+from ._arrays import Array, columns, numbers, pandas
 from ._errors import Notice, notices, unusable
 from ._robot import PathLike, Robot
 
@@ -79,8 +79,6 @@ class Record:
 
     def to_frame(self) -> Any:
         """A pandas ``DataFrame`` with the columns of a log."""
-        from ._results import pandas
-
         names, data = self._table()
         return pandas().DataFrame(dict(zip(names, data)))
 
@@ -152,7 +150,7 @@ def _payload(payload: Payload) -> Optional[Dict[str, Any]]:
     form = 'payload is "none", "unknown" or {"mass": 2.0, "com": (0, 0, 0.05), "inertia": (…)}'
     if not isinstance(payload, Mapping) or "mass" not in payload or set(payload) - {"mass", "com", "inertia"}:
         raise unusable(f"{form}, not {payload!r}")
-    from ._arrays import vector
+    from ._arrays import pandas, vector
 
     body: Dict[str, Any] = {"mass": float(payload["mass"]), "com": None, "inertia": None}
     if not (np.isfinite(body["mass"]) and body["mass"] > 0):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple
 import numpy as np
 
 from . import _excite
-from ._arrays import Array, columns, from_columns
+from ._arrays import Array, columns, from_columns, pandas
 from ._errors import Notice, notices, unusable
 from ._records import Payload, Record
 from ._robot import PathLike, Robot
@@ -19,15 +19,6 @@ from ._trajectory import Motion, Trajectory
 
 if TYPE_CHECKING:
     from ._posterior import Posterior
-
-
-def pandas() -> Any:
-    """pandas, or how to get it."""
-    try:
-        import pandas as found
-    except ImportError:
-        raise unusable("frames need pandas: pip install pandas") from None
-    return found
 
 
 def frame_html(page: str, height: int = 720) -> str:
@@ -582,6 +573,17 @@ def _floats(values: Any) -> Array:
     return np.array([_float(x) for x in values], dtype=np.float64)
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a design; the best trajectory so far is kept."""
+
+    best: Optional[Design]
+    """the design with the best trajectory that was found until then"""
+
+    def __init__(self, best: Optional[Design] = None) -> None:
+        super().__init__("interrupted; the best trajectory so far is in .best")
+        self.best = best
+
+
 __all__ = [
     "Assessment",
     "Calibration",
@@ -589,6 +591,7 @@ __all__ = [
     "Diagnosis",
     "Export",
     "Identification",
+    "Interrupted",
     "Load",
     "Result",
     "Simulation",

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from . import _excite
 from ._arrays import vector
-from ._errors import Interrupted, emit, unusable
+from ._errors import emit, unusable
 from ._progress import Bar, Progress
 from ._records import Experiment, as_experiment
 from ._results import (
@@ -20,6 +20,7 @@ from ._results import (
     Diagnosis,
     Export,
     Identification,
+    Interrupted,
     Load,
     Simulation,
 )
@@ -570,17 +571,3 @@ def export(
     result = Export(raw)
     emit(result.warnings)
     return result
-
-
-__all__ = [
-    "assess",
-    "calibrate",
-    "design",
-    "diagnose",
-    "export",
-    "formats",
-    "identify",
-    "load",
-    "robots",
-    "simulate",
-]

@@ -11,13 +11,13 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 import numpy as np
 
 from . import _excite
-from ._arrays import Array, from_columns, numbers
+from ._arrays import Array, from_columns, numbers, pandas
 from ._command import Command, Feedback
 from ._errors import Notice, emit, unusable
 from ._mujoco import Model
 from ._progress import Bar, Progress
 from ._records import Experiment, as_experiment
-from ._results import Diagnosis, frame_html, pandas
+from ._results import Diagnosis, frame_html
 from ._robot import PathLike, Robot
 
 #: A simulator of a user: positions ``(steps + 1, joints)`` from the state at the start, a command and the time between

@@ -2,6 +2,7 @@
 
 use crate::call::{Interrupted, call, quick, simply};
 use crate::error::{argument, to_python};
+use crate::named::named;
 use crate::plant::Plant;
 use crate::report::Report;
 use excite::cli::design::{check_rate, diagnostic, periods};
@@ -12,16 +13,9 @@ use excite::log::Purpose;
 use excite::trajectory::{Grid, Trajectory};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
-use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// A value by its name in the settings.
-pub fn named<T: DeserializeOwned>(what: &str, text: &str) -> PyResult<T> {
-    serde_json::from_value(serde_json::Value::String(text.into()))
-        .map_err(|e| argument(format!("{what}: {e}")))
-}
 
 /// A trajectory from its JSON.
 pub fn trajectory(text: &str) -> PyResult<Trajectory> {

@@ -6,6 +6,7 @@
 mod call;
 mod design;
 mod error;
+mod named;
 mod plant;
 mod records;
 mod report;

@@ -97,7 +97,7 @@ impl Plant {
     }
 
     fn in_space(&self, py: Python<'_>, space: Option<String>) -> PyResult<Self> {
-        let space = space.map(|s| crate::design::named::<Space>("coordinates", &s));
+        let space = space.map(|s| crate::named::named::<Space>("coordinates", &s));
         let space = space.transpose()?;
         let core = (*self.core).clone();
         simply(py, move |_| core.in_space(space)).map(Self::from)

@@ -68,20 +68,25 @@ fn purpose(holdout: bool) -> Purpose {
 }
 
 impl Experiment {
-    /// A copy that may be changed.
-    pub fn owned(&self) -> log::Experiment {
-        let log::Experiment {
-            path,
-            spec,
-            plant,
-            records,
-        } = &*self.core;
-        log::Experiment {
-            path: path.clone(),
-            spec: spec.clone(),
-            plant: plant.clone(),
-            records: records.clone(),
+    /// The experiment with forces where it has chamber pressures; nothing is copied where it has none.
+    ///
+    /// # Errors
+    /// As [`log::Experiment::press`].
+    pub fn pressed(
+        core: Arc<log::Experiment>,
+        atmosphere: f64,
+    ) -> excite::Result<Arc<log::Experiment>> {
+        if core.records.iter().all(|r| r.pressures.is_none()) {
+            return Ok(core);
         }
+        let mut own = log::Experiment {
+            path: core.path.clone(),
+            spec: core.spec.clone(),
+            plant: core.plant.clone(),
+            records: core.records.clone(),
+        };
+        own.press(atmosphere)?;
+        Ok(Arc::new(own))
     }
 }
 

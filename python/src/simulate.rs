@@ -83,7 +83,7 @@ pub fn simulate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let trajectory = crate::design::trajectory(text)?;
     let core = plant.core.clone();
-    let controller = crate::design::named("controller", &controller)?;
+    let controller = crate::named::named("controller", &controller)?;
     let period = trajectory.fourier.period;
     let work = move |reporter: &Reporter| {
         let about = |e: Error| match e {

@@ -1,8 +1,9 @@
 //! After the run: `identify`, `load`, `diagnose`, `calibrate`, and `export`.
 
 use crate::call::{Interrupted, Reporter, call, simply};
-use crate::design::{named, trajectory};
+use crate::design::trajectory;
 use crate::error::notices;
+use crate::named::named;
 use crate::plant::Plant;
 use crate::records::Experiment;
 use crate::report::Report;
@@ -44,7 +45,7 @@ pub fn identify(
     identify: Option<Vec<String>>,
     atmosphere: f64,
 ) -> PyResult<Report> {
-    let mut core = experiment.owned();
+    let core = experiment.core.clone();
     let settings = identification::Settings {
         method: named("method", &method)?,
         consistency: named("consistency", &consistency)?,
@@ -59,7 +60,7 @@ pub fn identify(
     };
     simply(py, move |_| {
         let begin = Instant::now();
-        core.press(atmosphere)?;
+        let core = Experiment::pressed(core, atmosphere)?;
         let mut notes = excite::survey::check(&core.plant, &core.records)?;
         let plant = terms::columns(core.plant.clone(), identify.as_deref(), &mut notes)?;
         let mut id = identification::identify(&plant, &core.records, &settings)?;
@@ -159,7 +160,7 @@ pub fn diagnose(
     atmosphere: f64,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
-    let mut core = experiment.owned();
+    let core = experiment.core.clone();
     let settings = diagnosis::Settings {
         next,
         next_tries: next_tries.min(10_000),
@@ -167,7 +168,7 @@ pub fn diagnose(
     };
     let work = move |reporter: &Reporter| {
         let begin = Instant::now();
-        core.press(atmosphere)?;
+        let core = Experiment::pressed(core, atmosphere)?;
         let tell = |step: &str| reporter.tell(0.0, 0.0, step);
         let mut d = diagnosis::diagnose(&core, &settings, &tell)?;
         let model = Model {
