@@ -6,10 +6,7 @@ use excite::{Error, Plant};
 
 fn main() -> Result<(), Error> {
     let plant = Plant::load("ur10e")?;
-    let settings = Settings {
-        starts: Some(4),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.starts = Some(4));
     let result = design(&plant, &settings)?;
 
     let report = assess(&result.plant, Some(&result.trajectory))?;

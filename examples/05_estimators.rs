@@ -147,19 +147,15 @@ fn main() -> excite::Result<()> {
                 Method::Iv,
             ];
             for (k, method) in methods.into_iter().enumerate() {
-                let settings = Settings {
-                    method,
-                    prior_strength: Some(4.0),
-                    ..Settings::default()
-                };
+                let settings = Settings::default().with(|set| {
+                    set.method = method;
+                    set.prior_strength = Some(4.0);
+                });
                 let id = identify(&plant, &fit, &settings)?;
                 sums[k] += error(&id.pi).powi(2);
                 if method == Method::Wls {
                     sums[5] += error(&id.pi_consistent).powi(2);
-                    let lmi = Settings {
-                        consistency: Consistency::Lmi,
-                        ..settings
-                    };
+                    let lmi = settings.with(|set| set.consistency = Consistency::Lmi);
                     sums[6] += error(&identify(&plant, &fit, &lmi)?.pi_consistent).powi(2);
                 }
             }

@@ -77,20 +77,18 @@ fn record(
     seed: u64,
     periods: u32,
 ) -> Result<(Run, Record)> {
-    let settings = Design {
-        period: PERIOD,
-        ends: Ends::Free,
-        condition: Condition::Weighted,
-        starts: Some(2),
-        seed,
-        ..Design::default()
-    };
+    let settings = Design::default().with(|set| {
+        set.period = PERIOD;
+        set.ends = Ends::Free;
+        set.condition = Condition::Weighted;
+        set.starts = Some(2);
+        set.seed = seed;
+    });
     let motion = design(nominal, &settings)?.trajectory;
-    let settings = Simulation {
-        seed,
-        step: 1e-3,
-        ..Simulation::default()
-    };
+    let settings = Simulation::default().with(|set| {
+        set.seed = seed;
+        set.step = 1e-3;
+    });
     let run = simulate(truth, &motion.fourier, periods, &settings, &|_| {})?;
     let (sensors, _) = Sensors::new(truth, 1.0);
     let measured = measure(&run, &sensors, &settings.effects, seed);

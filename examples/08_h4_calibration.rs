@@ -47,10 +47,7 @@ fn main() -> excite::Result<()> {
         ("inverse model alone", false),
         ("with the orientation residual", true),
     ] {
-        let settings = Settings {
-            orientation,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.orientation = orientation);
         let found = calibrate::calibrate(&input, &robot, settings)?;
         let [before, after] = found.errors(false, true).map(|e| Stats::of(&e));
         if let (Some(a), Some(b)) = (before, after) {

@@ -65,6 +65,7 @@ pub enum Identifiability {
 
 /// One standard parameter, classed.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct StandardParameter {
     /// name, `link3.mx`
     pub name: String,
@@ -76,6 +77,7 @@ pub struct StandardParameter {
 
 /// The base parameters of a robot. See the [module](self) documentation.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct BaseParameters {
     /// names of the standard parameters, in column order
     pub names: Vec<String>,

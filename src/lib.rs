@@ -19,7 +19,7 @@
 //! use excite::identifiability::assess;
 //!
 //! let plant = excite::Plant::load("planar2")?; // a bundled name, a robot.toml or a URDF
-//! let settings = Settings { starts: Some(2), ..Settings::default() };
+//! let settings = Settings::default().with(|set| set.starts = Some(2));
 //! let result = design(&plant, &settings)?;
 //! let report = assess(&result.plant, Some(&result.trajectory))?;
 //! let excitation = report.excitation.expect("a trajectory was given");
@@ -97,6 +97,7 @@ pub mod regressor;
 #[doc(hidden)]
 pub mod report;
 pub mod robot;
+mod settings;
 pub mod signals;
 pub mod simulate;
 #[doc(hidden)]

@@ -53,24 +53,23 @@ pub fn design(
 ) -> PyResult<(Report, String, Motions, String, Option<Py<PyAny>>)> {
     let core = plant.core.clone();
     let condition = condition.map(|c| named("condition", &c)).transpose()?;
-    let settings = Settings {
-        harmonics,
-        period,
-        periods: periods(periods_, diagnostic).map_err(|e| to_python(&e))?,
-        grid: match diagnostic {
-            true => Grid::Odd,
-            false => named("grid", &grid)?,
-        },
-        ends: named("ends", &ends)?,
-        start,
-        criterion: named("criterion", &criterion)?,
-        condition: condition.unwrap_or(Condition::usual(&core)),
-        derate,
-        seed,
-        starts,
-        time_limit,
-        threads,
+    let mut settings = Settings::default();
+    settings.harmonics = harmonics;
+    settings.period = period;
+    settings.periods = periods(periods_, diagnostic).map_err(|e| to_python(&e))?;
+    settings.grid = match diagnostic {
+        true => Grid::Odd,
+        false => named("grid", &grid)?,
     };
+    settings.ends = named("ends", &ends)?;
+    settings.start = start;
+    settings.criterion = named("criterion", &criterion)?;
+    settings.condition = condition.unwrap_or(Condition::usual(&core));
+    settings.derate = derate;
+    settings.seed = seed;
+    settings.starts = starts;
+    settings.time_limit = time_limit;
+    settings.threads = threads;
     let work = move |reporter: &crate::call::Reporter| {
         let begin = Instant::now();
         settings.check(core.moved())?;

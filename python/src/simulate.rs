@@ -93,16 +93,15 @@ pub fn simulate<'py>(
         let plant = (*core).clone().in_space(trajectory.space).map_err(about)?;
         // the names are what makes it the same robot
         trajectory.matches(plant.moved()).map_err(about)?;
-        let mut settings = Settings {
-            rate,
-            step,
-            lead_in,
-            controller,
-            bandwidth,
-            damping,
-            seed,
-            ..Settings::default()
-        };
+        let mut settings = Settings::default().with(|set| {
+            set.rate = rate;
+            set.step = step;
+            set.lead_in = lead_in;
+            set.controller = controller;
+            set.bandwidth = bandwidth;
+            set.damping = damping;
+            set.seed = seed;
+        });
         effects.set(&plant, &mut settings)?;
         if !(noise >= 0.0 && noise.is_finite()) {
             return Err(Error::Argument(format!(

@@ -46,18 +46,16 @@ pub fn identify(
     atmosphere: f64,
 ) -> PyResult<Report> {
     let core = experiment.core.clone();
-    let settings = identification::Settings {
-        method: named("method", &method)?,
-        consistency: named("consistency", &consistency)?,
-        prior_strength: prior,
-        signals: signals::Settings {
-            cutoff,
-            position_cutoff,
-            average,
-            measured_rates: !derive,
-            ..Default::default()
-        },
-    };
+    let mut settings = identification::Settings::default();
+    settings.method = named("method", &method)?;
+    settings.consistency = named("consistency", &consistency)?;
+    settings.prior_strength = prior;
+    settings.signals = signals::Settings::default().with(|set| {
+        set.cutoff = cutoff;
+        set.position_cutoff = position_cutoff;
+        set.average = average;
+        set.measured_rates = !derive;
+    });
     simply(py, move |_| {
         let begin = Instant::now();
         let core = Experiment::pressed(core, atmosphere)?;
@@ -109,21 +107,19 @@ pub fn load(
     flange: [f64; 6],
 ) -> PyResult<Report> {
     let core = experiment.core.clone();
-    let settings = payload::Settings {
-        parameters: named("parameters", &parameters)?,
-        method: named("method", &method)?,
-        weighted,
-        consistent,
-        checked,
-        standstill,
-        atmosphere,
-        flange,
-        signals: signals::Settings {
-            position_cutoff,
-            cutoff,
-            ..Default::default()
-        },
-    };
+    let mut settings = payload::Settings::default();
+    settings.parameters = named("parameters", &parameters)?;
+    settings.method = named("method", &method)?;
+    settings.weighted = weighted;
+    settings.consistent = consistent;
+    settings.checked = checked;
+    settings.standstill = standstill;
+    settings.atmosphere = atmosphere;
+    settings.flange = flange;
+    settings.signals = signals::Settings::default().with(|set| {
+        set.position_cutoff = position_cutoff;
+        set.cutoff = cutoff;
+    });
     simply(py, move |_| {
         let found = payload::identify(&core, &settings)?;
         let (load, flange) = (&found.load().inertia, &found.flange);
@@ -161,11 +157,10 @@ pub fn diagnose(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
     let core = experiment.core.clone();
-    let settings = diagnosis::Settings {
-        next,
-        next_tries: next_tries.min(10_000),
-        seed,
-    };
+    let mut settings = diagnosis::Settings::default();
+    settings.next = next;
+    settings.next_tries = next_tries.min(10_000);
+    settings.seed = seed;
     let work = move |reporter: &Reporter| {
         let begin = Instant::now();
         let core = Experiment::pressed(core, atmosphere)?;
@@ -214,10 +209,9 @@ pub fn calibrate(
             )));
         }
     };
-    let settings = calibration::Settings {
-        algorithm,
-        orientation,
-    };
+    let mut settings = calibration::Settings::default();
+    settings.algorithm = algorithm;
+    settings.orientation = orientation;
     simply(py, move |_| {
         let (input, opened) = calibration::read(&path)?;
         let found = calibration::calibrate(&input, &opened, settings)?;

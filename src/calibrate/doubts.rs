@@ -1,9 +1,96 @@
 //! Rows that do not look like those of this robot.
 
 use super::file::Calibration;
+use super::fit::Fit;
 use super::frame::Frame;
+use super::identifiable::Identifiability;
 use super::judge::Errors;
-use crate::error::{Error, Result, Warning, WarningKind};
+use super::model::Model;
+use super::open::Opened;
+use super::result::GroupResult;
+use crate::error::{Error, Result, Warning, WarningKind, number};
+use faer::Mat;
+
+/// Warnings of the robot and of the files. What a calibration does not use is not worth a word.
+pub(super) fn carried(input: &Calibration, opened: &Opened) -> Vec<Warning> {
+    let used = |w: &&Warning| {
+        !matches!(
+            w.kind,
+            WarningKind::InertiaMissing | WarningKind::LimitsMissing
+        )
+    };
+    let of_robot = opened.plant.warnings().iter().filter(used);
+    of_robot.chain(&input.warnings).cloned().collect()
+}
+
+/// Fewer than three rows for the fit are an error.
+pub(super) fn too_few(input: &Calibration) -> Result<()> {
+    let fitted = input.rows.iter().filter(|r| r.fit).count();
+    if fitted >= 3 {
+        return Ok(());
+    }
+    let message = format!(
+        "{fitted} rows are for the fit; at least 3 are needed, and several times the unknowns are good"
+    );
+    Err(Error::file(&input.path, "", message))
+}
+
+/// A blurred border between what can be told and what cannot; fewer numbers than unknowns.
+pub(super) fn determined(model: &Model, known: &Identifiability, warnings: &mut Vec<Warning>) {
+    if known.gap < 1e3 && known.rank < known.total {
+        let message = format!(
+            "the border between what can be told and what cannot is blurred (gap {})",
+            number(known.gap)
+        );
+        let kind = WarningKind::RankGap;
+        warnings.push(Warning::new(kind, "identifiability", message));
+    }
+    let rows = &model.input.rows;
+    let fitted = (0..rows.len()).filter(|&i| rows[i].fit);
+    let residuals: usize = fitted.map(|i| model.residuals(i)).sum();
+    if residuals < known.total {
+        let message = format!(
+            "{residuals} numbers were measured for {} unknowns; tolerances decide the rest. Record more postures",
+            known.total
+        );
+        warnings.push(Warning::new(WarningKind::NotExcited, "rows", message));
+    }
+}
+
+/// A fit that was still moving when it was ended.
+pub(super) fn unsettled(fit: &Fit, warnings: &mut Vec<Warning>) {
+    if !fit.converged {
+        let message = format!(
+            "it did not come to rest within {} steps; the result is where it stood",
+            fit.steps
+        );
+        warnings.push(Warning::new(WarningKind::NotExcited, "fit", message));
+    }
+}
+
+/// Standard deviations that cannot be had.
+pub(super) fn uncertain(covariance: Option<&Mat<f64>>, warnings: &mut Vec<Warning>) {
+    if covariance.is_none() {
+        warnings.push(Warning::new(
+            WarningKind::NotIdentifiable,
+            "uncertainty",
+            "the information matrix has no inverse; standard deviations are not known",
+        ));
+    }
+}
+
+/// Groups that were spoiled while they were recorded.
+pub(super) fn spoiled(groups: &[GroupResult], warnings: &mut Vec<Warning>) {
+    for g in groups.iter().filter(|g| g.spoiled) {
+        let message = format!(
+            "its errors are out of proportion to those of all other groups (mean {} mm): it was spoiled while it \
+             was recorded, a socket or camera moved, say. It is not counted among the sound ones",
+            number(1e3 * g.after.map_or(f64::NAN, |s| s.mean))
+        );
+        let kind = WarningKind::RecordLeftOut;
+        warnings.push(Warning::new(kind, g.name.clone(), message));
+    }
+}
 
 /// Rows whose joint readings no pose gives are left out, with a warning; too many of them are an error.
 pub(super) fn unreached(

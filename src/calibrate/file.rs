@@ -2,7 +2,7 @@
 
 use super::kind::{Held, Kind, Purpose};
 use super::pixels::{Camera, Optics};
-use super::rows::{self, Row};
+use super::rows::{self, Row, Source};
 use crate::error::{Error, Result, Warning};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -262,15 +262,15 @@ impl Calibration {
                     stated(entry.angle_std, at, &file.angle_std, "angle_std", "rad")?,
                 ),
             };
-            let table = rows::read(
-                &folder.join(&entry.file),
+            let source = Source {
+                path: &folder.join(&entry.file),
                 kind,
-                optics.as_ref(),
-                &joints,
-                measurements.len(),
-                entry.purpose,
-                &mut warnings,
-            )?;
+                optics: optics.as_ref(),
+                joints: &joints,
+                measurement: measurements.len(),
+                purpose: entry.purpose,
+            };
+            let table = rows::read(&source, &mut warnings)?;
             noise_stated &= match optics {
                 Some(_) => entry.std.is_some(),
                 None => std.is_some() || table.iter().all(|r| r.covariance.is_some()),

@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// A frame in another: turns and shifts points of its own axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Frame {
     /// rotation
     pub r: Matrix3<f64>,

@@ -27,6 +27,7 @@ const WORD: f64 = 0.05;
 
 /// A direction that nothing tells.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Confounded {
     /// the leading unknown
     pub parameter: String,
@@ -38,6 +39,7 @@ pub struct Confounded {
 
 /// What can be told.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Identifiability {
     /// number of independent combinations
     pub rank: usize,

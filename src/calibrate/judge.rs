@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 
 /// Mean, median, root mean square, 95th percentile and maximum of errors.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Stats {
     /// mean
     pub mean: f64,
@@ -41,6 +42,7 @@ impl Stats {
 
 /// Errors by row. Where a posture cannot be taken they are not numbers.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Errors {
     /// m: distance of a point from the mean of its socket, of a target from where it was seen, of a point from its
     /// plane

@@ -10,6 +10,7 @@
 //! that are fitted; the rows held out judge the result and nothing else.
 
 mod actuators_at;
+mod bench;
 mod cells;
 mod doubts;
 mod effects;
@@ -35,6 +36,8 @@ mod pixels;
 pub mod poses;
 mod result;
 mod robust;
+mod row_columns;
+mod row_doubts;
 mod rows;
 mod select;
 mod serial;
@@ -57,11 +60,8 @@ pub use result::{Calibrated, DistanceResult, GroupResult, Identified, Outlier, R
 pub use select::Trial;
 pub use unknown::{Part, Unknown};
 
-use crate::error::{Error, Result, Warning, WarningKind};
-use feature::Feature;
-use fit::Plan;
-use kin::Kin;
-use model::Model;
+use crate::error::Result;
+use bench::Bench;
 use std::path::Path;
 
 /// Reads a `calibration.toml`, its robot and its rows.
@@ -76,198 +76,54 @@ pub fn read(path: impl AsRef<Path>) -> Result<(Calibration, Opened)> {
     })
 }
 
-/// Calibrates.
+/// Calibrates: the nominal robot under the instruments, effects that the rows bear out, what can be told, the fit,
+/// its errors, and the robot that is written.
 ///
 /// # Errors
 /// Too few rows, rows that contradict the robot, a robot whose geometry cannot be calibrated.
 pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Result<Calibrated> {
-    let mut warnings: Vec<Warning> = opened.plant.warnings().to_vec();
-    // what a calibration does not use is not worth a word
-    warnings.retain(|w| {
-        !matches!(
-            w.kind,
-            WarningKind::InertiaMissing | WarningKind::LimitsMissing
-        )
-    });
-    warnings.extend(input.warnings.iter().cloned());
-    let fitted = input.rows.iter().filter(|r| r.fit).count();
-    if fitted < 3 {
-        return Err(Error::file(
-            &input.path,
-            "",
-            format!(
-                "{fitted} rows are for the fit; at least 3 are needed, and several times the unknowns are good"
-            ),
-        ));
-    }
-    let gravity = match &opened.kin {
-        Kin::Arm(_) => gravity::gravity(input, opened, &mut warnings)?,
-        Kin::Parallel(_) => None,
-    };
-    let postures: Vec<Vec<f64>> = input.rows.iter().map(|r| r.q.clone()).collect();
-    let torques = gravity.as_ref().map(|g| g.torques(&postures));
-    let poses: Vec<Option<Frame>> = input
-        .rows
-        .iter()
-        .map(|r| opened.kin.nominal(&r.q).ok())
-        .collect();
-    doubts::unreached(input, &poses, &mut warnings)?;
-    let start = start::start(input, &opened.kin, &poses)?;
-    let make = |features: Vec<Feature>| {
-        let start = start.clone();
-        Model::new(
-            input,
-            &opened.kin,
-            features,
-            torques.as_deref(),
-            start,
-            &poses,
-            settings,
-        )
-    };
-    let nominal = make(Vec::new());
-    let x0 = vec![0.0; nominal.count()];
-    let mut plan = Plan {
-        weights: (input.rows.iter().zip(&poses))
-            .map(|(r, p)| f64::from(u8::from(r.fit && p.is_some())))
-            .collect(),
-        free: vec![false; nominal.count()],
-        robust: true,
-    };
-    let x_before = robust::set_up(&nominal, &plan, &x0)?;
+    let mut warnings = doubts::carried(input, opened);
+    doubts::too_few(input)?;
+    let bench = Bench::new(input, opened, settings, &mut warnings)?;
+    let nominal = bench.model(Vec::new());
+    let mut plan = bench.plan(&nominal);
+    let x_before = robust::set_up(&nominal, &plan, &vec![0.0; nominal.count()])?;
     let before = judge::errors(&nominal, &x_before);
     doubts::suspicious(input, &before, &mut warnings);
     doubts::unmoved(input, &opened.joints, &mut warnings);
-    let names = &opened.joints;
-    let motions = opened.kin.motions(names.len());
-    let columns = |part: Part| {
-        let none = || vec![vec![0.0; names.len()]; input.rows.len()];
-        match opened.kin {
-            Kin::Parallel(_) => Vec::new(),
-            Kin::Arm(_) => match &torques {
-                Some(t) => effects::features(part, names, &motions, t),
-                None => effects::features(part, names, &motions, &none()),
-            },
-        }
-    };
-    let chosen = select::choose(input, &make, &columns)?;
-    let mut model = make(chosen.features);
-    let mut x = robust::extend(&nominal, &model, &x_before);
+    let chosen = select::choose(input, &|f| bench.model(f), &|part| bench.columns(part))?;
+    let mut model = bench.model(chosen.features);
+    let x = robust::extend(&nominal, &model, &x_before);
     plan.free = robust::seen(&model, &plan);
-    let identifiability = {
-        // what can be told hangs on geometry and postures, not on noise; the algorithms of the paper see no orientation
-        let mut exact = model.clone();
-        exact.consistent = true;
-        exact.settings.orientation = false;
-        identifiable::assess(&exact, &plan, &x)?
-    };
-    if identifiability.gap < 1e3 && identifiability.rank < identifiability.total {
-        warnings.push(Warning::new(
-            WarningKind::RankGap,
-            "identifiability",
-            format!(
-                "the border between what can be told and what cannot is blurred (gap {})",
-                crate::error::number(identifiability.gap)
-            ),
-        ));
-    }
-    let residuals: usize = (0..input.rows.len())
-        .filter(|&i| input.rows[i].fit)
-        .map(|i| model.residuals(i))
-        .sum();
-    if residuals < identifiability.total {
-        warnings.push(Warning::new(
-            WarningKind::NotExcited,
-            "rows",
-            format!(
-                "{residuals} numbers were measured for {} unknowns; tolerances decide the rest. Record more postures",
-                identifiability.total
-            ),
-        ));
-    }
+    let identifiability = identifiable::assess(&model.exact(), &plan, &x)?;
+    doubts::determined(&model, &identifiability, &mut warnings);
     let fit = robust::robustly(&mut model, &mut plan, &x)?;
-    if !fit.converged {
-        warnings.push(Warning::new(
-            WarningKind::NotExcited,
-            "fit",
-            format!(
-                "it did not come to rest within {} steps; the result is where it stood",
-                fit.steps
-            ),
-        ));
-    }
-    x = fit.x;
-    let x = robust::set_up_rest(&model, &plan, &x)?;
+    doubts::unsettled(&fit, &mut warnings);
+    let x = robust::set_up_rest(&model, &plan, &fit.x)?;
     let after = judge::errors(&model, &x);
     let (groups, strays) = judge::strays(&model, &after);
     let covariance = fit::covariance(&model, &plan, &x);
-    if covariance.is_none() {
-        warnings.push(Warning::new(
-            WarningKind::NotIdentifiable,
-            "uncertainty",
-            "the information matrix has no inverse; standard deviations are not known",
-        ));
-    }
-    let std = |k: usize| {
-        covariance
-            .as_ref()
-            .map_or(f64::NAN, |c| c[(k, k)].max(0.0).sqrt())
-    };
-    let rows = result::row_results(
-        &model,
-        &x,
-        &groups,
-        &strays,
-        [&before, &after],
-        covariance.as_ref(),
-    );
+    doubts::uncertain(covariance.as_ref(), &mut warnings);
+    let errors = [&before, &after];
+    let rows = result::row_results(&model, &x, &groups, &strays, errors, covariance.as_ref());
     let groups = result::group_results(&groups, &rows);
-    for g in groups.iter().filter(|g| g.spoiled) {
-        warnings.push(Warning::new(
-            WarningKind::RecordLeftOut,
-            g.name.clone(),
-            format!(
-                "its errors are out of proportion to those of all other groups (mean {} mm): it was spoiled while it \
-                 was recorded, a socket or camera moved, say. It is not counted among the sound ones",
-                crate::error::number(1e3 * g.after.map_or(f64::NAN, |s| s.mean))
-            ),
-        ));
-    }
-    let outliers = result::outliers(&model, &x, &strays, &after);
-    let distances = result::distances(&nominal, &x_before, &model, &x);
-    let mut setups: Vec<(String, Frame, Frame)> = Vec::new();
-    for (m, measured) in input.measurements.iter().enumerate() {
-        if measured.kind.has_instrument() && !setups.iter().any(|s| s.0 == measured.instrument) {
-            setups.push((
-                measured.instrument.clone(),
-                model.camera(m, &x),
-                model.target(m, &x),
-            ));
-        }
-    }
+    doubts::spoiled(&groups, &mut warnings);
     let files = write::robot(opened, &x[..opened.kin.errors()])?;
     Ok(Calibrated {
         robot: opened.plant.name().to_string(),
         frame: opened.frame.clone(),
         joints: opened.joints.clone(),
         identifiability,
-        unknowns: (0..model.count())
-            .filter(|&k| plan.free[k])
-            .map(|k| Identified {
-                unknown: model.unknowns[k].clone(),
-                value: x[k],
-                std: std(k),
-            })
-            .collect(),
+        unknowns: result::identified(&model, &plan, &x, covariance.as_ref()),
         trials: chosen.trials,
         rows,
         groups,
-        outliers,
-        distances,
-        setups,
+        outliers: result::outliers(&model, &x, &strays, &after),
+        distances: result::distances(&nominal, &x_before, &model, &x),
+        setups: result::setups(&model, &x),
         noise: model.noise,
         steps: fit.steps,
-        gravity: gravity.map(|g| g.source),
+        gravity: bench.gravity.map(|g| g.source),
         files,
         warnings,
     })

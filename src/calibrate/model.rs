@@ -38,12 +38,15 @@ pub enum Algorithm {
 
 /// What a fit is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Settings {
     /// for parallel robots
     pub algorithm: Algorithm,
     /// whether the measured orientation of a parallel robot must be one that it can take
     pub orientation: bool,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {
@@ -127,6 +130,15 @@ impl<'a> Model<'a> {
             settings,
             consistent: false,
         }
+    }
+
+    /// The model that tells what can be identified at all: that hangs on geometry and postures, not on noise, and the
+    /// algorithms of the paper see no orientation.
+    pub fn exact(&self) -> Self {
+        let mut exact = self.clone();
+        exact.consistent = true;
+        exact.settings.orientation = false;
+        exact
     }
 
     /// The parallel robot, where its poses enter by its actuators.

@@ -15,6 +15,7 @@ use std::path::Path;
 
 /// A robot, opened.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Opened {
     /// the robot
     pub plant: Plant,

@@ -1,6 +1,7 @@
 //! What a calibration gives: unknowns, rows, groups, outliers, distances.
 
 use super::file::Distance;
+use super::fit::Plan;
 use super::frame::{self, Frame};
 use super::identifiable::Identifiability;
 use super::judge::{Errors, Group, Stats};
@@ -16,6 +17,7 @@ use nalgebra::DMatrix;
 
 /// One identified unknown.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Identified {
     /// name, unit, prior
     pub unknown: Unknown,
@@ -27,6 +29,7 @@ pub struct Identified {
 
 /// What a group of rows shows.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct GroupResult {
     /// name
     pub name: String,
@@ -48,6 +51,7 @@ pub struct GroupResult {
 
 /// A row that does not belong to the others.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Outlier {
     /// index among all rows, from 0
     pub row: usize,
@@ -63,6 +67,7 @@ pub struct Outlier {
 
 /// A known distance and what came out.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct DistanceResult {
     /// the two files
     pub between: [String; 2],
@@ -74,6 +79,7 @@ pub struct DistanceResult {
 
 /// A calibrated robot.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Calibrated {
     /// name of the robot
     pub robot: String,
@@ -111,6 +117,7 @@ pub struct Calibrated {
 
 /// One row.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct RowResult {
     /// index of its group
     pub group: usize,
@@ -310,4 +317,37 @@ pub(super) fn distances(
         }
     };
     input.distances.iter().map(each).collect()
+}
+
+/// The free unknowns with their standard deviations.
+pub(super) fn identified(
+    model: &Model,
+    plan: &Plan,
+    x: &[f64],
+    covariance: Option<&Mat<f64>>,
+) -> Vec<Identified> {
+    let std = |k: usize| covariance.map_or(f64::NAN, |c| c[(k, k)].max(0.0).sqrt());
+    (0..model.count())
+        .filter(|&k| plan.free[k])
+        .map(|k| Identified {
+            unknown: model.unknowns[k].clone(),
+            value: x[k],
+            std: std(k),
+        })
+        .collect()
+}
+
+/// Name, camera and target of each instrument.
+pub(super) fn setups(model: &Model, x: &[f64]) -> Vec<(String, Frame, Frame)> {
+    let mut setups: Vec<(String, Frame, Frame)> = Vec::new();
+    for (m, measured) in model.input.measurements.iter().enumerate() {
+        if measured.kind.has_instrument() && !setups.iter().any(|s| s.0 == measured.instrument) {
+            setups.push((
+                measured.instrument.clone(),
+                model.camera(m, x),
+                model.target(m, x),
+            ));
+        }
+    }
+    setups
 }

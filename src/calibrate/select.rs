@@ -14,6 +14,7 @@ use crate::error::Result;
 
 /// One effect that was tried.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Trial {
     /// its name
     pub effect: &'static str,

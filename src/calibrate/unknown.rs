@@ -24,6 +24,7 @@ pub enum Part {
 
 /// One unknown. Its value is the deviation from the start; see [`Unknown::prior`].
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Unknown {
     /// `panda_joint2.x`, `camera.rz`
     pub name: String,

@@ -8,7 +8,6 @@ use excite::design::{Condition, Control, Criterion, Progress, Settings, design_w
 use excite::identifiability::assess;
 use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;
-use excite::trajectory::samples::write_samples;
 use excite::trajectory::{Ends, Grid, Space, Trajectory};
 use excite::{Error, Plant, Result};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -252,15 +251,7 @@ pub fn samples(
     rate: f64,
 ) -> Result<()> {
     let (fourier, periods) = (&trajectory.fourier, trajectory.periods);
-    match plant.mechanism() {
-        None => {
-            let torque = excite::regressor::torque_function(plant.robot(), plant.tree());
-            write_samples(path, force, fourier, periods, rate, Some(&torque))?;
-        }
-        Some(mechanism) => {
-            mechanism.write_motion(path, force, fourier, periods, rate)?;
-        }
-    }
+    plant.write_motion(path, force, fourier, periods, rate)?;
     Ok(())
 }
 

@@ -1,7 +1,5 @@
 //! `excite torque ROBOT SAMPLES.csv`.
 
-use excite::dynamics::Samples;
-use excite::trajectory::samples::read_samples;
 use excite::{Plant, Result};
 use std::fmt::Write;
 
@@ -30,20 +28,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let plant = Plant::load(&args.robot)?;
     super::warn(plant.warnings());
-    let (t, motion) = match plant.mechanism() {
-        None => {
-            let samples = read_samples(&args.samples, plant.coordinates())?;
-            let motion = Samples {
-                dof: plant.coordinates(),
-                count: samples.len(),
-                q: samples.q.concat(),
-                qd: samples.qd.concat(),
-                qdd: samples.qdd.concat(),
-            };
-            (samples.t, motion)
-        }
-        Some(mechanism) => mechanism.read_motion(&args.samples)?,
-    };
+    let (t, motion) = plant.read_motion(&args.samples)?;
     let tau = plant.nominal_torque(&motion)?;
     let actuators = plant.actuated().len();
     let mut text = String::from("t");

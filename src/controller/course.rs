@@ -267,9 +267,7 @@ impl<'a> Course<'a> {
             let rows: Vec<usize> = match &self.way {
                 Way::Series => (0..n).collect(),
                 Way::Kinematics(plant) => {
-                    if let Some(mechanism) = plant.mechanism() {
-                        x = mechanism.motion(&x)?.tree;
-                    }
+                    x = plant.joint_motion(&x)?.into_owned();
                     plant.actuated().to_vec()
                 }
             };

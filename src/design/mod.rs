@@ -69,7 +69,7 @@ use torque_rate::TorqueRateLimits;
 /// use excite::design::{Settings, design};
 ///
 /// let plant = Plant::load("planar2")?;
-/// let settings = Settings { starts: Some(1), ..Settings::default() };
+/// let settings = Settings::default().with(|set| set.starts = Some(1));
 /// let result = design(&plant, &settings)?;
 /// assert!(result.plant.certify(&result.trajectory.fourier, 1.0)?.satisfied());
 /// # Ok::<(), excite::Error>(())
@@ -91,7 +91,7 @@ pub fn design(plant: &Plant, settings: &Settings) -> Result<Design> {
 /// use excite::design::{Control, Progress, Settings, design_with};
 ///
 /// let plant = Plant::load("planar2")?;
-/// let settings = Settings { starts: Some(1), ..Settings::default() };
+/// let settings = Settings::default().with(|set| set.starts = Some(1));
 /// let tell = |p: Progress| println!("{} starts, best {:.2}", p.starts, p.best);
 /// let control = Control { progress: &tell, ..Control::default() };
 /// let result = design_with(&plant, &settings, &control)?;

@@ -29,6 +29,7 @@ pub struct Start {
 
 /// Record of a design.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct Record {
     /// settings as used
     pub settings: Settings,

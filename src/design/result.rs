@@ -23,6 +23,7 @@ pub struct Design {
 
 /// Where a design stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// starts done
     pub starts: usize,

@@ -8,6 +8,7 @@ use crate::trajectory::{Ends, Grid};
 /// Settings of a design. Every field has a default that suits most arms.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Settings {
     /// harmonics of the Fourier series of each joint
     pub harmonics: usize,
@@ -40,6 +41,8 @@ pub struct Settings {
     #[serde(skip_serializing)]
     pub threads: usize,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {

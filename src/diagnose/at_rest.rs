@@ -9,6 +9,7 @@ use crate::report::format::significant;
 
 /// A record in which the whole robot stands for a while.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct AtRest {
     /// name of the record
     pub record: String,

@@ -14,6 +14,7 @@ use crate::signals::wiener::triangle;
 
 /// Gap of one actuator in physical units.
 #[derive(Debug, Clone, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct JointGap {
     /// name
     pub joint: String,

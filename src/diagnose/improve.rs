@@ -23,6 +23,7 @@ use crate::robot::Robot;
 
 /// The improved model.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Improved {
     /// bodies and joints with the parameters that were fitted and the effects that they can hold; not
     /// serialised, the writers of [`export`](crate::export) write it

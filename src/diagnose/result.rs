@@ -20,6 +20,7 @@ use crate::signals::series::Series;
 
 /// Energy of the gap in one record before and after the set, in units of the noise variance a sample.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct RecordGap {
     /// name
     pub name: String,
@@ -134,6 +135,7 @@ pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec
 
 /// An effect that would explain the records best with values that no machine can have.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct RuledOut {
     /// name, as in `formats.md`
     pub effect: &'static str,

@@ -2,6 +2,7 @@
 
 /// What a diagnosis is asked for.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Settings {
     /// whether to design the next experiment where effects are not told apart
     pub next: bool,
@@ -10,6 +11,8 @@ pub struct Settings {
     /// seed of random starts
     pub seed: u64,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {

@@ -13,6 +13,7 @@ const SEED: u64 = 0x70_2905;
 /// Torque uncertainty left over the workspace: at random states inside the limits, with `Y_b` the regressor of the
 /// base parameters there and `C` their predicted covariance, `√(mean diag(Y_b C Y_bᵀ))` for each actuator.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct TorqueUncertainty {
     /// predicted standard deviation of the torque of each actuator, N m or N
     pub std: Vec<f64>,

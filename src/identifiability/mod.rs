@@ -35,6 +35,7 @@ use faer::{Mat, MatRef, Side};
 
 /// The four condition numbers of one trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct ConditionNumbers {
     /// largest over smallest non-zero singular value of the regressor of all standard parameters
     pub invariant: f64,
@@ -48,6 +49,7 @@ pub struct ConditionNumbers {
 
 /// Predicted uncertainty of one base parameter.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Prediction {
     /// name of its kept column
     pub parameter: String,

@@ -10,6 +10,7 @@ use crate::trajectory::{RATE, Space};
 
 /// What the platform of a parallel robot does.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Platform {
     /// what its coordinates are
     pub task: Task,

@@ -13,6 +13,7 @@ const STRENGTHS: [f64; 8] = [1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
 
 /// Cross-validation of one strength of the prior.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
+#[non_exhaustive]
 pub struct Trial {
     /// strength `γ`
     pub strength: f64,

@@ -17,6 +17,7 @@ pub struct Removal {
 
 /// What is left, and what it cost.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Essential {
     /// base parameters that stay
     pub kept: Vec<usize>,

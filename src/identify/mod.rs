@@ -63,7 +63,7 @@ use normal::Normal;
 ///
 /// // a rehearsal: design, simulate, measure
 /// let plant = Plant::load("planar2")?;
-/// let settings = excite::design::Settings { starts: Some(1), ..Default::default() };
+/// let settings = excite::design::Settings::default().with(|set| set.starts = Some(1));
 /// let motion = excite::design::design(&plant, &settings)?.trajectory.fourier;
 /// let settings = Simulation::default();
 /// let run = simulate(&plant, &motion, 3, &settings, &|_| {})?;

@@ -37,6 +37,7 @@ pub enum Consistency {
 /// Settings of [`identify`](super::identify()).
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Settings {
     /// estimator of the base parameters
     pub method: Method,
@@ -47,3 +48,5 @@ pub struct Settings {
     /// preparation of the signals
     pub signals: signals::Settings,
 }
+
+crate::settings::changeable!(Settings);

@@ -10,6 +10,7 @@ use crate::signals::{self, Prepared};
 
 /// Residual of one joint.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct JointError {
     /// name
     pub joint: String,
@@ -21,6 +22,7 @@ pub struct JointError {
 
 /// Residuals of the records for one purpose.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Errors {
     /// norm of the residual over that of the measured torque, all joints
     pub relative_error: f64,
@@ -30,6 +32,7 @@ pub struct Errors {
 
 /// All of it.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Validation {
     /// of the model that is written, on the fit records
     pub fit: Errors,

@@ -25,6 +25,7 @@ use rayon::prelude::*;
 
 /// Factors of the measured torques.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Gains {
     /// actuators
     pub joints: Vec<String>,

@@ -29,6 +29,7 @@ const POOR: f64 = 1e4;
 
 /// Result of `estimate`.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct OneStep {
     /// the load
     pub load: LoadBody,

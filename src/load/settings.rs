@@ -26,6 +26,7 @@ pub enum Method {
 
 /// How the load is estimated.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Settings {
     /// unknowns
     pub parameters: Parameters,
@@ -47,6 +48,8 @@ pub struct Settings {
     /// preparation of the signals
     pub signals: signals::Settings,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {

@@ -178,6 +178,7 @@ pub fn total(samples: &[PlatformSample], gravity: &Vector3<f64>) -> Result<Total
 
 /// Result of [`estimate`].
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct TwoStep {
     /// the load: total minus platform
     pub load: LoadBody,

@@ -66,150 +66,22 @@ fn counter(jump: f64) -> Option<&'static str> {
 
 /// Looks through the stamps `raw` of the log called `subject`.
 pub fn repair(raw: &[f64], subject: &str) -> Clock {
-    let mut out = Clock::default();
-    let mut warn = |kind, message: String| out.warnings.push(Warning::new(kind, subject, message));
     let steps = || raw.windows(2).map(|w| w[1] - w[0]);
-    let time = |x: f64| x.is_finite() && x.abs() < LARGEST;
     let usual = median(steps().filter(|d| *d > 0.0));
     if !usual.is_finite() {
-        return out;
+        return Clock::default();
     }
     let same = steps().filter(|d| *d == 0.0).count();
     let coarse = same as f64 > 0.1 * raw.len() as f64;
-
-    let mut keep = Vec::with_capacity(raw.len());
-    let mut t: Vec<f64> = Vec::with_capacity(raw.len());
-    let (mut shift, mut lost, mut twice, mut back, mut wraps) = (0.0, 0, 0, 0, 0);
-    let mut wrap_text = String::new();
-    let mut first_lost = usize::MAX;
-    let (mut wrong, mut ahead) = (Vec::new(), Vec::new());
-    let mut room = FILLED * raw.len() as f64;
-    // whether a stamp after row i goes on where those before it were, at `last`
-    let returns = |i: usize, last: f64, now: f64, shift: f64| {
-        let later = raw[i + 1..].iter().take(WRONG).filter(|x| time(**x));
-        later.zip(2..).any(|(x, k)| {
-            let x = x + shift;
-            x > last && x - last < JUMP * f64::from(k) * usual && (x < now || now < last)
-        })
-    };
-    for (i, &x) in raw.iter().enumerate() {
-        if !time(x) {
-            first_lost = first_lost.min(i);
-            lost += 1;
-            continue;
-        }
-        let mut now = x + shift;
-        if t.is_empty()
-            && let [next, after] = raw[i + 1..]
-                .iter()
-                .filter(|y| time(**y))
-                .take(2)
-                .collect::<Vec<_>>()[..]
-            && (next - x < -JUMP * usual || next - x > room * usual)
-            && (after - next).abs() <= JUMP * usual
-        {
-            wrong.push((i, x));
-            continue;
-        }
-        if let Some(&last) = t.last() {
-            let step = now - last;
-            let far = step < -JUMP * usual || step > room.max(JUMP) * usual;
-            let at_the_end = far && i + 1 == raw.len();
-            if step.abs() > JUMP * usual && (at_the_end || returns(i, last, now, shift)) {
-                wrong.push((i, x));
-                continue;
-            }
-            if step > JUMP * usual {
-                if far {
-                    ahead.push((i, step));
-                    shift -= step - CLOSED * usual;
-                    now = last + CLOSED * usual;
-                } else {
-                    room -= step / usual;
-                }
-            }
-            if step < -JUMP * usual {
-                // the clock began anew: the next sample follows by one usual step
-                let jump = -step + usual;
-                if wraps == 0 {
-                    wrap_text = match counter(jump) {
-                        Some(name) => format!("a counter of {name} that wrapped"),
-                        None => "a clock that was set back or began anew".into(),
-                    };
-                    wrap_text = format!("by {jump:.6} s at row {}: {wrap_text}", i + 1);
-                }
-                wraps += 1;
-                shift += jump;
-                now += jump;
-            } else if step == 0.0 && !coarse {
-                twice += 1;
-                continue;
-            } else if step < 0.0 {
-                back += 1;
-                continue;
-            }
-        }
-        keep.push(i);
-        t.push(now);
+    let mut scan = Scan::new(raw, usual, coarse);
+    for i in 0..raw.len() {
+        scan.take(i);
     }
-    if lost > 0 {
-        warn(
-            WarningKind::RowsLeftOut,
-            format!(
-                "{lost} rows have no time stamp and were left out, the first is row {}",
-                first_lost + 1
-            ),
-        );
-    }
-    if let Some((row, x)) = wrong.first() {
-        warn(
-            WarningKind::RowsLeftOut,
-            format!(
-                "{} time stamps are far from those around them and their rows were left out, the first at row {} \
-                 ({x:e} s)",
-                wrong.len(),
-                row + 1
-            ),
-        );
-    }
-    if let Some((row, by)) = ahead.first() {
-        let more = match ahead.len() {
-            1 => String::new(),
-            n => format!(" (and {} times more)", n - 1),
-        };
-        warn(
-            WarningKind::TimeRepaired,
-            format!(
-                "the time jumps ahead by {by:.6} s at row {}{more}, by far more than the log is long: the clock \
-                 was set, or the recording stopped; the stamps after it were moved back to follow by {CLOSED} steps",
-                row + 1
-            ),
-        );
-    }
-    if wraps > 0 {
-        let more = match wraps {
-            1 => String::new(),
-            n => format!(" (and {} times more)", n - 1),
-        };
-        warn(
-            WarningKind::TimeRepaired,
-            format!(
-                "the time jumps back {wrap_text}{more}; the stamps after it were moved to follow by one step"
-            ),
-        );
-    }
-    if twice > 0 {
-        warn(
-            WarningKind::RowsLeftOut,
-            format!("{twice} time stamps repeat the one before; those rows were left out"),
-        );
-    }
-    if back > 0 {
-        warn(
-            WarningKind::RowsLeftOut,
-            format!("{back} time stamps are earlier than the one before; those rows were left out"),
-        );
-    }
+    let Scan {
+        keep, mut t, found, ..
+    } = scan;
+    let mut warnings = found.warnings(subject);
+    let mut warn = |kind, message: String| warnings.push(Warning::new(kind, subject, message));
     if coarse && t.len() > 1 {
         warn(
             WarningKind::TimeRepaired,
@@ -219,10 +91,7 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
                 raw.len()
             ),
         );
-        let (a, b, n) = (t[0], t[t.len() - 1], t.len() - 1);
-        t.iter_mut()
-            .enumerate()
-            .for_each(|(i, x)| *x = a + (b - a) * i as f64 / n as f64);
+        spread(&mut t);
     }
     let step = median(t.windows(2).map(|w| w[1] - w[0]));
     if step >= 0.5 {
@@ -234,59 +103,287 @@ pub fn repair(raw: &[f64], subject: &str) -> Clock {
             ),
         );
     }
-    let mut missing = 0.0;
-    for w in t.windows(2) {
-        let d = w[1] - w[0];
-        if d > GAP * step {
-            out.gaps.push([w[0], w[1]]);
-            missing += d / step - 1.0;
-        }
-    }
-    if !out.gaps.is_empty() {
-        let longest = out.gaps.iter().map(|g| g[1] - g[0]).fold(0.0, f64::max);
-        let warning = format!(
-            "{} gaps in the time, about {missing:.0} samples missing, the longest {longest:.4} s; they \
-             are interpolated for the filters and left out of the fit",
-            out.gaps.len()
+    let gaps = gaps(&t, step);
+    warnings.extend(missing(&gaps, step, subject));
+    let (step, even, jitter) = evenness(&t, step);
+    warnings.extend(jitter.map(|share| {
+        let message = format!(
+            "the time stamps jitter by {:.1} % of the usual step of {step:.6} s (rms); \
+             resampled to an even grid",
+            100.0 * share
         );
-        out.warnings
-            .push(Warning::new(WarningKind::TimeGaps, subject, warning));
+        Warning::new(WarningKind::Resampled, subject, message)
+    }));
+    Clock {
+        keep: (keep.len() < raw.len()).then_some(keep),
+        t,
+        step,
+        even,
+        gaps,
+        warnings,
     }
-    // even: against the line from first to last stamp; a grid with gaps is not
-    if let [first, .., last] = t[..] {
-        let mean = (last - first) / (t.len() - 1) as f64;
-        let worst = t
-            .iter()
-            .enumerate()
-            .map(|(i, x)| (x - first - mean * i as f64).abs())
-            .fold(0.0, f64::max);
-        out.even = worst <= 0.02 * mean;
-        if out.even {
-            out.step = mean;
-        } else {
-            out.step = step;
-            let spread: Vec<f64> = t
-                .windows(2)
-                .map(|w| w[1] - w[0])
-                .filter(|d| *d <= GAP * step)
-                .collect();
-            let rms = (spread.iter().map(|d| (d - step) * (d - step)).sum::<f64>()
-                / spread.len().max(1) as f64)
-                .sqrt();
-            if rms > 0.01 * step {
-                out.warnings.push(Warning::new(
-                    WarningKind::Resampled,
-                    subject,
-                    format!(
-                        "the time stamps jitter by {:.1} % of the usual step of {step:.6} s (rms); \
-                         resampled to an even grid",
-                        100.0 * rms / step
-                    ),
-                ));
-            }
+}
+
+/// Stamps of a coarse clock at even distances, the first and the last where they are.
+fn spread(t: &mut [f64]) {
+    let (a, b, n) = (t[0], t[t.len() - 1], t.len() - 1);
+    t.iter_mut()
+        .enumerate()
+        .for_each(|(i, x)| *x = a + (b - a) * i as f64 / n as f64);
+}
+
+/// From and to of each step that is far too long.
+fn gaps(t: &[f64], step: f64) -> Vec<[f64; 2]> {
+    let long = |w: &&[f64]| w[1] - w[0] > GAP * step;
+    t.windows(2).filter(long).map(|w| [w[0], w[1]]).collect()
+}
+
+fn missing(gaps: &[[f64; 2]], step: f64, subject: &str) -> Option<Warning> {
+    let longest = gaps.iter().map(|g| g[1] - g[0]).reduce(f64::max)?;
+    let missing: f64 = gaps.iter().map(|g| (g[1] - g[0]) / step - 1.0).sum();
+    let message = format!(
+        "{} gaps in the time, about {missing:.0} samples missing, the longest {longest:.4} s; they \
+         are interpolated for the filters and left out of the fit",
+        gaps.len()
+    );
+    Some(Warning::new(WarningKind::TimeGaps, subject, message))
+}
+
+/// Step of the grid, whether the stamps lie on it, and how far they jitter, as a share of it, where that is worth a
+/// word. Even is meant against the line from first to last stamp; a grid with gaps is not.
+fn evenness(t: &[f64], step: f64) -> (f64, bool, Option<f64>) {
+    let [first, .., last] = t[..] else {
+        return (0.0, false, None);
+    };
+    let mean = (last - first) / (t.len() - 1) as f64;
+    let worst = t
+        .iter()
+        .enumerate()
+        .map(|(i, x)| (x - first - mean * i as f64).abs())
+        .fold(0.0, f64::max);
+    if worst <= 0.02 * mean {
+        return (mean, true, None);
+    }
+    let spread: Vec<f64> = t
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|d| *d <= GAP * step)
+        .collect();
+    let rms = (spread.iter().map(|d| (d - step) * (d - step)).sum::<f64>()
+        / spread.len().max(1) as f64)
+        .sqrt();
+    (step, false, (rms > 0.01 * step).then_some(rms / step))
+}
+
+/// What is wrong with the stamps of a log.
+#[derive(Default)]
+struct Found {
+    /// rows without a time, and the first of them
+    lost: usize,
+    first_lost: Option<usize>,
+    /// rows with a stamp far from those around them
+    wrong: Vec<(usize, f64)>,
+    /// rows at which the time jumps ahead, and by how much
+    ahead: Vec<(usize, f64)>,
+    /// how often it jumps back, and what the first jump is
+    wraps: usize,
+    wrap: String,
+    twice: usize,
+    back: usize,
+}
+
+/// A pass over the stamps.
+struct Scan<'a> {
+    raw: &'a [f64],
+    /// usual step, s
+    usual: f64,
+    /// whether equal stamps come from a coarse clock
+    coarse: bool,
+    /// rows that are kept, and their times
+    keep: Vec<usize>,
+    t: Vec<f64>,
+    /// by which stamps are moved from here on, s
+    shift: f64,
+    /// steps that gaps may still take
+    room: f64,
+    found: Found,
+}
+
+fn is_time(x: f64) -> bool {
+    x.is_finite() && x.abs() < LARGEST
+}
+
+impl<'a> Scan<'a> {
+    fn new(raw: &'a [f64], usual: f64, coarse: bool) -> Self {
+        Scan {
+            raw,
+            usual,
+            coarse,
+            keep: Vec::with_capacity(raw.len()),
+            t: Vec::with_capacity(raw.len()),
+            shift: 0.0,
+            room: FILLED * raw.len() as f64,
+            found: Found::default(),
         }
     }
-    out.keep = (keep.len() < raw.len()).then_some(keep);
-    out.t = t;
-    out
+
+    /// Keeps row `i` and its time, or leaves it out and remembers why.
+    fn take(&mut self, i: usize) {
+        let x = self.raw[i];
+        if !is_time(x) {
+            self.found.lost += 1;
+            self.found.first_lost.get_or_insert(i);
+            return;
+        }
+        let now = match self.t.last() {
+            None if self.strays(i) => {
+                self.found.wrong.push((i, x));
+                None
+            }
+            None => Some(x + self.shift),
+            Some(&last) => self.after(i, last),
+        };
+        if let Some(now) = now {
+            self.keep.push(i);
+            self.t.push(now);
+        }
+    }
+
+    /// Whether the first stamp is far from the next two, which are near one another.
+    fn strays(&self, i: usize) -> bool {
+        let x = self.raw[i];
+        let mut later = self.raw[i + 1..].iter().filter(|y| is_time(**y));
+        let (Some(next), Some(after)) = (later.next(), later.next()) else {
+            return false;
+        };
+        (next - x < -JUMP * self.usual || next - x > self.room * self.usual)
+            && (after - next).abs() <= JUMP * self.usual
+    }
+
+    /// Whether a stamp after row `i` goes on where those before it were, at `last`.
+    fn returns(&self, i: usize, last: f64, now: f64) -> bool {
+        let near = self.raw[i + 1..].iter().take(WRONG);
+        let mut later = near.filter(|x| is_time(**x)).zip(2..);
+        later.any(|(x, k)| {
+            let x = x + self.shift;
+            x > last && x - last < JUMP * f64::from(k) * self.usual && (x < now || now < last)
+        })
+    }
+
+    /// Time of row `i` that follows `last`; `None` where it is left out.
+    fn after(&mut self, i: usize, last: f64) -> Option<f64> {
+        let (x, usual) = (self.raw[i], self.usual);
+        let now = x + self.shift;
+        let step = now - last;
+        let far = step < -JUMP * usual || step > self.room.max(JUMP) * usual;
+        let at_the_end = far && i + 1 == self.raw.len();
+        if step.abs() > JUMP * usual && (at_the_end || self.returns(i, last, now)) {
+            self.found.wrong.push((i, x));
+            return None;
+        }
+        if step > JUMP * usual && far {
+            self.found.ahead.push((i, step));
+            self.shift -= step - CLOSED * usual;
+            return Some(last + CLOSED * usual);
+        }
+        if step > JUMP * usual {
+            self.room -= step / usual;
+        } else if step < -JUMP * usual {
+            // the clock began anew: the next sample follows by one usual step
+            let jump = -step + usual;
+            if self.found.wraps == 0 {
+                let what = match counter(jump) {
+                    Some(name) => format!("a counter of {name} that wrapped"),
+                    None => "a clock that was set back or began anew".into(),
+                };
+                self.found.wrap = format!("by {jump:.6} s at row {}: {what}", i + 1);
+            }
+            self.found.wraps += 1;
+            self.shift += jump;
+            return Some(now + jump);
+        } else if step == 0.0 && !self.coarse {
+            self.found.twice += 1;
+            return None;
+        } else if step < 0.0 {
+            self.found.back += 1;
+            return None;
+        }
+        Some(now)
+    }
+}
+
+/// ` (and 2 times more)` of three.
+fn more(count: usize) -> String {
+    match count {
+        1 => String::new(),
+        n => format!(" (and {} times more)", n - 1),
+    }
+}
+
+impl Found {
+    fn warnings(&self, subject: &str) -> Vec<Warning> {
+        let mut out = Vec::new();
+        let mut warn = |kind, message: String| out.push(Warning::new(kind, subject, message));
+        if let Some(first) = self.first_lost {
+            warn(
+                WarningKind::RowsLeftOut,
+                format!(
+                    "{} rows have no time stamp and were left out, the first is row {}",
+                    self.lost,
+                    first + 1
+                ),
+            );
+        }
+        if let Some((row, x)) = self.wrong.first() {
+            warn(
+                WarningKind::RowsLeftOut,
+                format!(
+                    "{} time stamps are far from those around them and their rows were left out, the first at row {} \
+                     ({x:e} s)",
+                    self.wrong.len(),
+                    row + 1
+                ),
+            );
+        }
+        if let Some((row, by)) = self.ahead.first() {
+            warn(
+                WarningKind::TimeRepaired,
+                format!(
+                    "the time jumps ahead by {by:.6} s at row {}{}, by far more than the log is long: the clock \
+                     was set, or the recording stopped; the stamps after it were moved back to follow by {CLOSED} steps",
+                    row + 1,
+                    more(self.ahead.len())
+                ),
+            );
+        }
+        if self.wraps > 0 {
+            warn(
+                WarningKind::TimeRepaired,
+                format!(
+                    "the time jumps back {}{}; the stamps after it were moved to follow by one step",
+                    self.wrap,
+                    more(self.wraps)
+                ),
+            );
+        }
+        if self.twice > 0 {
+            warn(
+                WarningKind::RowsLeftOut,
+                format!(
+                    "{} time stamps repeat the one before; those rows were left out",
+                    self.twice
+                ),
+            );
+        }
+        if self.back > 0 {
+            warn(
+                WarningKind::RowsLeftOut,
+                format!(
+                    "{} time stamps are earlier than the one before; those rows were left out",
+                    self.back
+                ),
+            );
+        }
+        out
+    }
 }

@@ -41,6 +41,7 @@ const SAMPLES: usize = 4000;
 
 /// What is known of the limits of a closed chain.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct MechanismCertificate {
     /// the workspace box, coordinates of the platform as joints: exact where the series are theirs,
     /// else sampled with a stated bound

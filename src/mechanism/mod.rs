@@ -71,6 +71,7 @@ pub use margins::{Margins, PoseKind, PoseUse};
 #[doc(hidden)]
 pub use motion::MechanismMotion;
 pub use motion::MechanismWorkspace;
+pub(crate) use motion_file::read_joint_motion;
 #[doc(hidden)]
 pub use parameters::Parameters;
 pub use parameters::{Group, Pattern};

@@ -10,8 +10,7 @@ use super::task::{PlatformMotion, Task, from_quaternion};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::output::write_atomic;
-use crate::trajectory::Fourier;
-use crate::trajectory::samples::{Line, StateFn, column_names, read_columns, read_samples, times};
+use crate::trajectory::samples::{Line, StateFn, column_names, read_columns, read_samples};
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
 
@@ -21,31 +20,28 @@ const POSE: [&str; 19] = [
     "alx", "aly", "alz",
 ];
 
+/// Times and motion of `n` joints from the columns `t`, `q1..`, `dq1..`, `ddq1..` of a CSV file.
+///
+/// # Errors
+/// As [`read_samples`].
+pub(crate) fn read_joint_motion(path: impl AsRef<Path>, n: usize) -> Result<(Vec<f64>, Samples)> {
+    let read = read_samples(path, n)?;
+    let motion = Samples {
+        dof: n,
+        count: read.len(),
+        q: read.q.concat(),
+        qd: read.qd.concat(),
+        qdd: read.qdd.concat(),
+    };
+    Ok((read.t, motion))
+}
+
 impl Mechanism {
-    /// Writes a motion of the task coordinates (the platform's or the actuators') as CSV at `rate` hertz for so many periods, end point
-    /// included: `t`, then `q1.. dq1.. ddq1.. tau1..` of the actuators (nominal forces), then the
-    /// platform as [`Mechanism::read_motion`] reads it. Returns the number of samples.
+    /// Writes a motion of the task coordinates (the platform's or the actuators') at these times as CSV: `t`, then
+    /// `q1.. dq1.. ddq1.. tau1..` of the actuators (nominal forces), then the platform as [`Mechanism::read_motion`] reads it.
     ///
     /// # Errors
     /// A pose that cannot be taken, and as [`write_samples`](crate::trajectory::samples::write_samples).
-    pub fn write_motion(
-        &self,
-        path: impl AsRef<Path>,
-        force: bool,
-        trajectory: &Fourier,
-        periods: u32,
-        rate: f64,
-    ) -> Result<usize> {
-        let times = times(trajectory.period * f64::from(periods), rate)?;
-        let at = |t: f64, out: [&mut [f64]; 3]| trajectory.evaluate(t, out);
-        self.write_along(path, force, &times, &at)?;
-        Ok(times.len())
-    }
-
-    /// Writes any motion of the task coordinates at these times, as [`Mechanism::write_motion`] does.
-    ///
-    /// # Errors
-    /// As [`Mechanism::write_motion`].
     pub fn write_along(
         &self,
         path: impl AsRef<Path>,
@@ -130,15 +126,7 @@ impl Mechanism {
     pub fn read_motion(&self, path: impl AsRef<Path>) -> Result<(Vec<f64>, Samples)> {
         let path = path.as_ref();
         if let Task::Joints(n) = self.task {
-            let read = read_samples(path, n)?;
-            let motion = Samples {
-                dof: n,
-                count: read.len(),
-                q: read.q.concat(),
-                qd: read.qd.concat(),
-                qdd: read.qdd.concat(),
-            };
-            return Ok((read.t, motion));
+            return read_joint_motion(path, n);
         }
         let header = column_names(path)?;
         let has = |name: &str| header.iter().any(|h| h == name);

@@ -109,10 +109,7 @@ impl<'a> Guard<'a> {
     /// Distances of some pairs in a posture.
     fn distances(&self, x: &[f64], pairs: &[usize], at: &mut Vec<Pose>) -> Result<Vec<f64>> {
         let robot = self.plant.robot();
-        match self.plant.mechanism() {
-            None => poses(robot, x, at),
-            Some(_) => poses(robot, &self.plant.posture(x)?, at),
-        }
+        poses(robot, &self.plant.posture(x)?, at);
         let distance = |&p: &usize| self.scene.separation(&self.scene.pairs[p], at).distance;
         Ok(pairs.iter().map(distance).collect())
     }

@@ -22,6 +22,7 @@ const KEPT: f64 = 1.0 + 1e-6;
 
 /// Largest torque of an actuator during a move.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct TorquePeak {
     /// name of the actuator
     pub joint: String,

@@ -43,7 +43,7 @@ use crate::collision::scene::Scene;
 use crate::error::{Error, Result, Warning};
 use crate::plant::Plant;
 use crate::trajectory::Fourier;
-use crate::trajectory::samples::{Samples, times, write_along};
+use crate::trajectory::samples::{Samples, times};
 use leg::Leg;
 
 /// Position, velocity and acceleration of all coordinates.
@@ -93,6 +93,7 @@ impl State {
 /// How to move.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct Settings {
     /// share of the limits of velocity, acceleration and jerk that is used
     pub scale: f64,
@@ -104,6 +105,8 @@ pub struct Settings {
     /// is made that much slower; `None`: as fast as it can be
     pub rate: Option<f64>,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {
@@ -118,6 +121,7 @@ impl Default for Settings {
 
 /// What one coordinate does during a move.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct JointPeaks {
     /// its name
     pub joint: String,
@@ -313,7 +317,7 @@ impl Move {
     /// Writes the samples with the columns of `samples.csv`. Returns how many there are.
     ///
     /// # Errors
-    /// As [`times`] and [`write_along`].
+    /// As [`times`] and [`Plant::write_along`].
     pub fn write(
         &self,
         plant: &Plant,
@@ -323,13 +327,7 @@ impl Move {
     ) -> Result<usize> {
         let times = times(self.duration, rate)?;
         let at = |t: f64, out: [&mut [f64]; 3]| self.evaluate(t, out);
-        match plant.mechanism() {
-            None => {
-                let torque = crate::regressor::torque_function(plant.robot(), plant.tree());
-                write_along(path, force, self.dof(), &times, &at, Some(&torque))?;
-            }
-            Some(mechanism) => mechanism.write_along(path, force, &times, &at)?,
-        }
+        plant.write_along(path, force, &times, &at)?;
         Ok(times.len())
     }
 }

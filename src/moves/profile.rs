@@ -66,6 +66,7 @@ pub struct Profile {
 
 /// Largest magnitudes over all time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct Peaks {
     /// least and largest position
     pub position: [f64; 2],

@@ -6,6 +6,7 @@ use crate::plant::Plant;
 
 /// Largest speed and acceleration of the tool point, sampled.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct ToolPeak {
     /// link that it sits on
     pub frame: String,

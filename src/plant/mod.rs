@@ -16,6 +16,7 @@
 mod certify;
 mod follow;
 mod kind;
+mod motion_file;
 mod noise;
 mod scene;
 mod summary;

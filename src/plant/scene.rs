@@ -10,6 +10,7 @@ use crate::trajectory::certificate::Proof;
 use crate::trajectory::extrema::extrema;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -110,10 +111,10 @@ impl Plant {
     ///
     /// # Errors
     /// A pose that cannot be reached.
-    pub fn posture(&self, x: &[f64]) -> Result<Vec<f64>> {
+    pub fn posture<'a>(&self, x: &'a [f64]) -> Result<Cow<'a, [f64]>> {
         match self.mechanism() {
-            None => Ok(x.to_vec()),
-            Some(mechanism) => mechanism.inverse(x),
+            None => Ok(Cow::Borrowed(x)),
+            Some(mechanism) => Ok(Cow::Owned(mechanism.inverse(x)?)),
         }
     }
 

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::regressor::{Regressor, nominal_torque, term_factor};
 use crate::robot::{Column, JointTerm};
 use faer::Mat;
+use std::borrow::Cow;
 
 impl Plant {
     /// The stacked regressor `W` of a motion of the coordinates, on all threads: row `a·count + s`
@@ -120,15 +121,26 @@ impl Plant {
         Ok(tau)
     }
 
+    /// Motion of all joints, passive ones included, that goes with a motion of the coordinates.
+    ///
+    /// # Errors
+    /// As [`Plant::regressor`].
+    pub fn joint_motion<'a>(&self, x: &'a Samples) -> Result<Cow<'a, Samples>> {
+        match self.mechanism() {
+            None => Ok(Cow::Borrowed(x)),
+            Some(mechanism) => Ok(Cow::Owned(mechanism.motion(x)?.tree)),
+        }
+    }
+
     /// Motion of the actuators that goes with a motion of the coordinates.
     ///
     /// # Errors
     /// As [`Plant::regressor`].
     pub fn actuator_motion(&self, x: &Samples) -> Result<Samples> {
-        match self.mechanism() {
-            None => Ok(x.clone()),
-            Some(mechanism) => Ok(mechanism.motion(x)?.tree.rows(&self.actuated)),
-        }
+        Ok(match self.joint_motion(x)? {
+            Cow::Borrowed(x) => x.clone(),
+            Cow::Owned(joints) => joints.rows(&self.actuated),
+        })
     }
 
     /// Columns of the ten parameters of one body of the tree, whether or not they are unknowns,

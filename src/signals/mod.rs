@@ -66,6 +66,7 @@ pub enum Derivation {
 /// How signals are prepared. `None` is chosen from the data.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Settings {
     /// cut-off of the positions before they are differentiated, Hz (all joints)
     pub position_cutoff: Option<f64>,
@@ -82,6 +83,8 @@ pub struct Settings {
     /// whether the pose columns give the coordinates of a parallel robot, instead of its actuators
     pub measured_pose: bool,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {

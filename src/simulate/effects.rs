@@ -44,6 +44,7 @@ impl Default for JointEffect {
 
 /// All effects of a simulated robot.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+#[non_exhaustive]
 pub struct Effects {
     /// one for each actuator; empty where there are none
     pub joints: Vec<JointEffect>,
@@ -56,6 +57,8 @@ pub struct Effects {
     /// spread of the bodies' inertia and of the joint terms about the nominal ones, as a fraction
     pub perturb: f64,
 }
+
+crate::settings::changeable!(Effects);
 
 /// Which field of [`JointEffect`] an option sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

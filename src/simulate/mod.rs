@@ -20,7 +20,7 @@
 //! let plant = Plant::load("planar2")?;
 //! let series = |a: f64| Series { constant: 0.0, sin: vec![a], cos: vec![0.1] };
 //! let motion = Fourier::new(2.0, vec![1], vec![series(0.5), series(-0.4)])?;
-//! let settings = Settings { rate: 200.0, ..Settings::default() };
+//! let settings = Settings::default().with(|set| set.rate = 200.0);
 //! let run = simulate(&plant, &motion, 1, &settings, &|_| {})?;
 //! assert_eq!(run.motion.count, 400);
 //! # Ok::<(), excite::Error>(())

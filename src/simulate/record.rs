@@ -13,12 +13,15 @@ use std::path::Path;
 
 /// The sensors of a robot.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Sensors {
     /// standard deviation of the torque, actuator by actuator, N m or N
     pub torque_noise: Vec<f64>,
     /// step of the position sensors, rad or m; 0 for none
     pub resolution: Vec<f64>,
 }
+
+crate::settings::changeable!(Sensors);
 
 impl Sensors {
     /// As the robot file states them, the noise times `scale` (0: ideal sensors). Torque noise that
@@ -58,6 +61,7 @@ impl Sensors {
 
 /// Measured positions and torques, actuator-major.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Measured {
     /// positions, rad or m
     pub q: Vec<f64>,

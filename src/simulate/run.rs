@@ -9,6 +9,7 @@ use nalgebra::DVector;
 
 /// What really happened: the simulated motion without any sensor.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Run {
     /// times, s, from 0
     pub t: Vec<f64>,

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 
 /// How to simulate.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
 pub struct Settings {
     /// samples a second of the log, Hz
     pub rate: f64,
@@ -24,6 +25,8 @@ pub struct Settings {
     /// of everything random
     pub seed: u64,
 }
+
+crate::settings::changeable!(Settings);
 
 impl Default for Settings {
     fn default() -> Self {

@@ -8,6 +8,7 @@ pub const TOLERANCE: f64 = 1e-9;
 /// At no time is the magnitude of the torque larger than [`TorqueBound::bound`]
 /// `= max_on_grid + between_grid_bound + coulomb`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct TorqueBound {
     /// name of the joint
     pub joint: String,
@@ -49,6 +50,7 @@ impl TorqueBound {
 /// At no time is the magnitude larger than [`SampledBound::bound`]
 /// `= max_on_grid + between_grid_bound`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct SampledBound {
     /// largest magnitude at a sample
     pub max_on_grid: f64,

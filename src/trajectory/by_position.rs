@@ -31,6 +31,7 @@ const ROUNDS: usize = 20;
 
 /// The largest share of a velocity by position that a motion uses.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct PositionPeak {
     /// velocity where the share is largest, rad/s or m/s, with its sign
     pub velocity: f64,

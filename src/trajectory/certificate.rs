@@ -58,6 +58,7 @@ impl Kind {
 
 /// The largest magnitude of a quantity over all time, against its limit.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct Peak {
     /// largest magnitude
     pub value: f64,
@@ -106,6 +107,7 @@ impl Peak {
 
 /// Range of a joint position over all time, against its limits.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct Range {
     /// smallest position and when
     pub min: Extremum,
@@ -178,6 +180,7 @@ pub enum Proof {
 
 /// What is proven of one joint.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct JointCertificate {
     /// name of the joint
     pub joint: String,
@@ -255,6 +258,7 @@ pub struct Worst {
 
 /// Proof that a motion keeps a robot's limits at all times, or where it does not.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct Certificate {
     /// joint by joint
     pub joints: Vec<JointCertificate>,

@@ -13,6 +13,7 @@ const TARGET: f64 = 0.002;
 
 /// What is known of the tool point: the largest magnitudes of its velocity and acceleration.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct ToolCertificate {
     /// link that it sits on
     pub frame: String,

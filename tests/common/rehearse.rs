@@ -19,15 +19,14 @@ pub fn motion(robot: &str) -> Fourier {
     let cell = all.entry(robot.into()).or_default().clone();
     drop(all);
     cell.get_or_init(|| {
-        let settings = Design {
-            harmonics: 3,
-            period: 5.0,
-            grid: Grid::Odd,
-            ends: Ends::Free,
-            condition: Condition::Normalised,
-            starts: Some(1),
-            ..Design::default()
-        };
+        let settings = Design::default().with(|set| {
+            set.harmonics = 3;
+            set.period = 5.0;
+            set.grid = Grid::Odd;
+            set.ends = Ends::Free;
+            set.condition = Condition::Normalised;
+            set.starts = Some(1);
+        });
         let plant = Plant::load(robot).unwrap();
         let found = design(&plant, &settings).unwrap();
         found.trajectory.fourier
@@ -45,14 +44,13 @@ pub fn within(motion: &Fourier, period: f64) -> Fourier {
 
 /// A simulation of a drive of 30 Hz, logged at 200 Hz.
 pub fn simulation(effects: Effects) -> Simulation {
-    Simulation {
-        rate: 200.0,
-        step: 5e-4,
-        bandwidth: 30.0,
-        seed: 1,
-        effects,
-        ..Simulation::default()
-    }
+    Simulation::default().with(|set| {
+        set.rate = 200.0;
+        set.step = 5e-4;
+        set.bandwidth = 30.0;
+        set.seed = 1;
+        set.effects = effects;
+    })
 }
 
 /// A record of these channels.

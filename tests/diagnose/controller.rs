@@ -30,19 +30,15 @@ fn motion(dof: usize, period: f64, size: f64) -> Fourier {
 }
 
 fn settings(controller: Controller, bandwidth: f64, perturb: f64) -> Simulation {
-    Simulation {
-        rate: RATE,
-        step: 5e-4,
-        controller,
-        bandwidth,
-        damping: 0.8,
-        effects: Effects {
-            perturb,
-            ..Effects::default()
-        },
-        seed: 3,
-        ..Simulation::default()
-    }
+    Simulation::default().with(|set| {
+        set.rate = RATE;
+        set.step = 5e-4;
+        set.controller = controller;
+        set.bandwidth = bandwidth;
+        set.damping = 0.8;
+        set.effects = Effects::default().with(|set| set.perturb = perturb);
+        set.seed = 3;
+    })
 }
 
 /// A log of the simulated robot with its commanded positions, and its true positions.
@@ -81,10 +77,7 @@ fn inverse_dynamics_control_is_found_and_gives_the_motion_of_the_model() {
     // the model under this controller, by the simulator; and by the diagnosis, which has only the logs
     let model = settings(Controller::Feedforward, 3.0, 0.0);
     let moved = log(&plant, &slow, false, &model, NOISE).truth;
-    let plain = Settings {
-        next: false,
-        ..Settings::default()
-    };
+    let plain = Settings::default().with(|set| set.next = false);
     let d = of_logs(&plant, &raws, &plain, &|_| {}).unwrap();
     let f = &d.forward.records[0];
     let count = raws[1].t.len();
@@ -233,10 +226,7 @@ fn identified(perturb: f64, load: Option<f64>) -> Diagnosis {
             without_commands(log(&plant, &motion(6, period, size), fit, &sim, 1.0))
         })
         .into();
-    let plain = Settings {
-        next: false,
-        ..Settings::default()
-    };
+    let plain = Settings::default().with(|set| set.next = false);
     of_logs(&plant, &raws, &plain, &|_| {}).unwrap()
 }
 

@@ -137,10 +137,7 @@ fn logs_of(
 }
 
 fn diagnosed(logs: &[Record]) -> Diagnosis {
-    let settings = Settings {
-        next: false,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.next = false);
     of_logs(&robots().0, logs, &settings, &|_| {}).expect("a diagnosis")
 }
 
@@ -506,10 +503,7 @@ fn a_record_in_memory_is_not_read_again() {
 fn of_folder(folder: &str) -> Option<Diagnosis> {
     let path = shared(folder)?;
     let experiment = Experiment::read(path.join("experiment.toml")).expect("an experiment");
-    let settings = Settings {
-        next: false,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.next = false);
     Some(diagnose(&experiment, &settings, &|_| {}).expect("a diagnosis"))
 }
 

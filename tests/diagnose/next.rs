@@ -37,10 +37,7 @@ impl Case {
             }
         }
         let at = |factor: f64| within(&motion, 5.0 * slower * factor);
-        let mut effects = Effects {
-            perturb: 0.03,
-            ..Effects::default()
-        };
+        let mut effects = Effects::default().with(|set| set.perturb = 0.03);
         if let Some((field, text)) = effect {
             effects.set(&plant, field, text).unwrap();
         }
@@ -64,11 +61,10 @@ impl Case {
     }
 
     fn diagnose(&self, next: bool, tries: usize) -> Diagnosis {
-        let settings = Settings {
-            next,
-            next_tries: tries,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| {
+            set.next = next;
+            set.next_tries = tries;
+        });
         of_logs(&self.plant, &self.logs, &settings, &|_| {}).unwrap()
     }
 

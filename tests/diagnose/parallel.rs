@@ -42,10 +42,7 @@ impl Rehearsal {
     /// fitted to.
     fn logs(&self, robot: &Plant, effects: Effects) -> Vec<Record> {
         let speeds = [(5.0, true), (9.0, true), (6.5, false)];
-        let settings = rehearse::simulation(Effects {
-            perturb: 0.03,
-            ..effects
-        });
+        let settings = rehearse::simulation(effects.with(|set| set.perturb = 0.03));
         let one = |(period, fit): (f64, bool)| {
             let (motion, seed) = (within(&self.motion, period), (10.0 * period) as u64);
             without_commands(log(robot, &motion, fit, &settings, self.noise, seed))
@@ -56,10 +53,7 @@ impl Rehearsal {
     /// Diagnosis by the model `model` of the robot `real`.
     fn diagnose(&self, what: &str, real: &str, model: &str, effects: Effects) -> Diagnosis {
         let (real, model) = (plant(real), plant(model));
-        let settings = Settings {
-            next: false,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.next = false);
         let d = of_logs(&model, &self.logs(&real, effects), &settings, &|_| {}).unwrap();
         let first = d.findings.first();
         println!(
@@ -169,10 +163,7 @@ fn a_delta_is_diagnosed() {
 fn a_load_on_a_known_delta_is_a_payload() {
     let mut r = Rehearsal::new("delta");
     r.text = format!("prior = \"identified\"\n{}", r.text);
-    let effects = Effects {
-        payload: load("0.5,0.0,0.01,0.02"),
-        ..Effects::default()
-    };
+    let effects = Effects::default().with(|set| set.payload = load("0.5,0.0,0.01,0.02"));
     let d = r.of("payload", effects);
     assert_eq!(first(&d), Some("payload"), "{:?}", claims(&d));
     let mass = d.findings[0].values.iter().find(|v| v.name == "mass");

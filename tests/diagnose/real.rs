@@ -68,10 +68,7 @@ fn records(dir: &Path, robot: &str, all: &[(&str, &str, &str)]) -> Experiment {
 }
 
 fn diagnosed(plant: &Plant, logs: &[Record]) -> Diagnosis {
-    let settings = Settings {
-        next: false,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.next = false);
     of_logs(plant, logs, &settings, &|_| {}).expect("a diagnosis")
 }
 

@@ -41,10 +41,7 @@ fn script(python: &str, what: &str, folder: &Path) -> String {
 
 fn diagnosed(folder: &Path) {
     let experiment = Experiment::read(folder.join("experiment.toml")).unwrap();
-    let settings = Settings {
-        next: false,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.next = false);
     let found = diagnose(&experiment, &settings, &|_| {}).unwrap();
     let out = folder.join("out");
     std::fs::create_dir(&out).unwrap();

@@ -175,10 +175,7 @@ fn every_base_parameter_of_every_bundled_robot_comes_back_without_noise() {
                     ..Run::default()
                 },
             );
-            let settings = Settings {
-                prior_strength: Some(1e-2),
-                ..Settings::default()
-            };
+            let settings = Settings::default().with(|set| set.prior_strength = Some(1e-2));
             let id = identify(&plant, &[r], &settings).unwrap();
             let e = worst(&id, &phi, &id.pi);
             assert!(e < 1e-8, "{name}, rates {rates}: {e:.2e}");
@@ -253,10 +250,7 @@ fn every_base_parameter_of_every_bundled_parallel_robot_comes_back_without_noise
             warnings: Vec::new(),
         };
         assert_eq!(record.actuators(), n);
-        let settings = Settings {
-            prior_strength: Some(1e-2),
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.prior_strength = Some(1e-2));
         let measured = Record {
             period: None,
             dq: Some(twice(&motion.qd)),
@@ -299,10 +293,7 @@ fn intervals_cover() {
             r.period = None;
             let exact = record(&plant, &phi, Purpose::Fit, &Run { rates: true, ..run });
             (r.dq, r.ddq) = (exact.dq, exact.ddq);
-            let settings = Settings {
-                prior_strength: Some(1.0),
-                ..Settings::default()
-            };
+            let settings = Settings::default().with(|set| set.prior_strength = Some(1.0));
             let id = identify(&plant, &[r], &settings).unwrap();
             for ((x, s), exact) in id.pi.iter().zip(&id.std).zip(id.base.project(&phi)) {
                 inside += usize::from((x - exact).abs() <= 1.96 * s);
@@ -344,10 +335,7 @@ fn all_methods_agree_where_they_should() {
         Method::Ml,
         Method::Iv,
     ] {
-        let settings = Settings {
-            method,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.method = method);
         let id = identify(&plant, &[fit.clone(), holdout.clone()], &settings).unwrap();
         let far = id
             .pi
@@ -367,10 +355,7 @@ fn all_methods_agree_where_they_should() {
     let mut bare = fit.clone();
     (bare.period, bare.qref) = (None, None);
     for (method, word) in [(Method::Ml, "period"), (Method::Iv, "qref1")] {
-        let settings = Settings {
-            method,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.method = method);
         let e = identify(&plant, &[bare.clone()], &settings)
             .unwrap_err()
             .to_string();
@@ -398,11 +383,10 @@ fn outliers_do_not_move_the_robust_estimate() {
         r.tau[0][k] += 30.0;
     }
     let error = |method: Method| {
-        let settings = Settings {
-            method,
-            prior_strength: Some(1.0),
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| {
+            set.method = method;
+            set.prior_strength = Some(1.0);
+        });
         let id = identify(&plant, &[r.clone()], &settings).unwrap();
         worst(&id, &phi, &id.pi)
     };
@@ -422,11 +406,10 @@ fn bodies_stay_possible_when_the_data_are_poor() {
     };
     let r = record(&plant, &phi, Purpose::Fit, &run);
     for consistency in [Consistency::Entropic, Consistency::Lmi] {
-        let settings = Settings {
-            consistency,
-            prior_strength: Some(1.0),
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| {
+            set.consistency = consistency;
+            set.prior_strength = Some(1.0);
+        });
         let id = identify(&plant, std::slice::from_ref(&r), &settings).unwrap();
         assert!(id.consistent, "{consistency:?} {:?}", id.margin);
         let robot = plant.with_values(&id.phi);
@@ -447,10 +430,7 @@ fn bodies_stay_possible_when_the_data_are_poor() {
             );
         }
     }
-    let free = Settings {
-        consistency: Consistency::Free,
-        ..Settings::default()
-    };
+    let free = Settings::default().with(|set| set.consistency = Consistency::Free);
     assert!(
         !identify(&plant, &[r], &free).unwrap().consistent,
         "this noise makes impossible bodies"
@@ -488,10 +468,7 @@ fn what_the_motion_does_not_show_is_named() {
     let id = identify(
         &plant,
         &[r],
-        &Settings {
-            prior_strength: Some(1.0),
-            ..Settings::default()
-        },
+        &Settings::default().with(|set| set.prior_strength = Some(1.0)),
     )
     .unwrap();
     let text: Vec<String> = id.warnings.iter().map(ToString::to_string).collect();
@@ -555,10 +532,7 @@ fn standstill_is_left_out() {
     for q in run.q.iter_mut().flatten() {
         *q += 2e-6 * normal(r);
     }
-    let settings = Settings {
-        prior_strength: Some(1e-2),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.prior_strength = Some(1e-2));
     let id = identify(&plant, &[run], &settings).unwrap();
     let told: Vec<String> = id.warnings.iter().map(ToString::to_string).collect();
     assert!(
@@ -614,10 +588,7 @@ fn a_test_without_its_recordings_says_so() {
 fn emps_gives_the_published_values() {
     let Some(e) = recorded("emps") else { return };
     // a strength at which the prior, which holds the published values, does nothing
-    let settings = Settings {
-        prior_strength: Some(1e-2),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.prior_strength = Some(1e-2));
     let id = identify(&e.plant, &e.records, &settings).unwrap();
     for (name, value) in [
         ("carriage.m", 95.1),

@@ -311,10 +311,7 @@ fn stribeck_friction_and_noise_stay_within_the_targets() {
     let (mut one, mut plain, mut two) = ([0.0f64; 3], [0.0f64; 3], [0.0f64; 3]);
     for seed in 0..5 {
         let found = hexapod(&truth, 100.0, 1000, seed, &Settings::default());
-        let even = Settings {
-            weighted: false,
-            ..Settings::default()
-        };
+        let even = Settings::default().with(|set| set.weighted = false);
         let unweighted = hexapod(&truth, 100.0, 1000, seed, &even);
         let add = |to: &mut [f64; 3], v: &[f64; 10]| {
             let e = errors(v, &LOAD);
@@ -395,10 +392,7 @@ fn payload_of_a_serial_robot() {
         prepared("loaded", &z, torque(&plant, &z, &truth, 2), 100.0),
         Payload::Unknown,
     )];
-    let settings = Settings {
-        parameters: Parameters::MassCom,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.parameters = Parameters::MassCom);
     let found = from_records(&plant, only, &settings).unwrap();
     let v = found.load().values();
     assert!(
@@ -452,10 +446,7 @@ fn a_load_that_cannot_exist_is_moved_to_one_that_can() {
         noise: 4.0,
         ..Truth::default()
     };
-    let free = Settings {
-        consistent: false,
-        ..Settings::default()
-    };
+    let free = Settings::default().with(|set| set.consistent = false);
     let mut moved = 0;
     for seed in 0..6 {
         let raw = hexapod(&truth, 100.0, 300, seed, &free);

@@ -200,10 +200,7 @@ fn records_are_exchanged() {
     assert!(said.contains("the records are exchanged"), "{said}");
     assert!(said.contains("empty (payload") && said.contains("loaded (payload"));
     // who wants to go on can
-    let on = Settings {
-        checked: false,
-        ..Settings::default()
-    };
+    let on = Settings::default().with(|set| set.checked = false);
     assert!(run(false, turned, &on, |_| ()).is_ok());
 }
 

@@ -40,10 +40,7 @@ fn arm(more: &str) -> Plant {
 }
 
 fn settings() -> Settings {
-    Settings {
-        starts: Some(2),
-        ..Settings::default()
-    }
+    Settings::default().with(|set| set.starts = Some(2))
 }
 
 fn scene(plant: &Plant) -> std::sync::Arc<Scene> {
@@ -131,10 +128,7 @@ fn a_wider_margin_is_kept_as_well() {
 
 #[test]
 fn the_panda_keeps_clear_of_itself_and_of_the_floor() {
-    let settings = Settings {
-        starts: Some(1),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.starts = Some(1));
     let plant = Plant::load("panda").unwrap();
     let names = scene(&plant);
     let floor = names.pairs.iter().any(|p| names.names(p)[1] == "floor");
@@ -155,10 +149,7 @@ fn the_floor_is_in_the_way_of_the_free_design() {
 
 #[test]
 fn a_start_posture_in_the_floor_is_refused() {
-    let settings = Settings {
-        start: Some(vec![-1.4, 0.0]),
-        ..settings()
-    };
+    let settings = settings().with(|set| set.start = Some(vec![-1.4, 0.0]));
     match design(&arm(""), &settings) {
         Err(Error::Infeasible(m)) => {
             assert!(m.contains("lower") && m.contains("floor"), "{m}");
@@ -215,10 +206,7 @@ fn a_frame_stays_in_its_box() {
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {
     let with = |threads| {
-        let settings = Settings {
-            threads,
-            ..settings()
-        };
+        let settings = settings().with(|set| set.threads = threads);
         design(&arm(""), &settings).unwrap().trajectory.fourier
     };
     assert_eq!(with(1), with(4));

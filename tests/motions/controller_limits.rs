@@ -55,11 +55,10 @@ fn largest(fourier: &Fourier) -> (f64, usize) {
 }
 
 pub fn one_start(plant: &Plant) -> Design {
-    let settings = Settings {
-        starts: Some(1),
-        period: 5.0,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.starts = Some(1);
+        set.period = 5.0;
+    });
     design(plant, &settings).unwrap()
 }
 
@@ -110,12 +109,11 @@ fn a_design_that_ignores_it_is_refused() {
 #[test]
 fn derated_it_keeps_the_share() {
     let plant = Plant::load("fr3").unwrap().without_collisions();
-    let settings = Settings {
-        starts: Some(1),
-        period: 5.0,
-        derate: 0.7,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.starts = Some(1);
+        set.period = 5.0;
+        set.derate = 0.7;
+    });
     let d = design(&plant, &settings).unwrap();
     let (used, _) = largest(&d.trajectory.fourier);
     assert!(used <= 0.7 + 1e-9 && used > 0.4, "{used}");
@@ -126,10 +124,7 @@ fn a_start_beyond_the_last_position_is_refused() {
     let plant = Plant::load("fr3").unwrap().without_collisions();
     let mut start = vec![0.0, 0.0, 0.0, -1.6, 0.0, 2.5, 0.0];
     start[0] = 2.89; // inside the range, where no velocity outwards is left
-    let settings = Settings {
-        start: Some(start),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.start = Some(start));
     let e = design(&plant, &settings).map(|d| d.value).unwrap_err();
     assert!(
         e.is_argument() && e.to_string().contains("fr3_joint1"),
@@ -140,10 +135,7 @@ fn a_start_beyond_the_last_position_is_refused() {
 #[test]
 fn moves_keep_it_at_every_instant() {
     let plant = Plant::load("fr3").unwrap();
-    let settings = MoveSettings {
-        scale: 1.0,
-        ..MoveSettings::default()
-    };
+    let settings = MoveSettings::default().with(|set| set.scale = 1.0);
     let ready = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785];
     for q in [
         [2.8, 1.7, -2.8, -0.4, 2.7, 4.4, -2.9],

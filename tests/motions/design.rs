@@ -40,10 +40,7 @@ fn within_limits(name: &str) -> Plant {
 }
 
 fn small(starts: usize) -> Settings {
-    Settings {
-        starts: Some(starts),
-        ..Settings::default()
-    }
+    Settings::default().with(|set| set.starts = Some(starts))
 }
 
 /// A random point and the information matrix of a robot with all joint columns.
@@ -167,10 +164,7 @@ fn the_count_of_known_parameters_has_exact_gradients() {
 fn more_parameters_are_known_where_they_are_counted() {
     let plant = within_limits("ur5e");
     let count = |criterion| {
-        let settings = Settings {
-            criterion,
-            ..small(3)
-        };
+        let settings = small(3).with(|set| set.criterion = criterion);
         let d = design(&plant, &settings).unwrap();
         let report = assess(&d.plant, Some(&d.trajectory)).unwrap();
         let e = report.excitation.unwrap();
@@ -259,28 +253,25 @@ fn designs_stay_inside_every_limit_at_100_khz() {
         ("panda", small(2)),
         (
             "scara",
-            Settings {
-                grid: Grid::Odd,
-                harmonics: 4,
-                period: 6.0,
-                ..small(2)
-            },
+            small(2).with(|set| {
+                set.grid = Grid::Odd;
+                set.harmonics = 4;
+                set.period = 6.0;
+            }),
         ),
         (
             "ur10",
-            Settings {
-                derate: 0.7,
-                criterion: Criterion::D,
-                ..small(1)
-            },
+            small(1).with(|set| {
+                set.derate = 0.7;
+                set.criterion = Criterion::D;
+            }),
         ),
         (
             "planar2",
-            Settings {
-                ends: Ends::Free,
-                condition: Condition::Weighted,
-                ..small(2)
-            },
+            small(2).with(|set| {
+                set.ends = Ends::Free;
+                set.condition = Condition::Weighted;
+            }),
         ),
     ];
     for (name, settings) in cases {
@@ -321,11 +312,10 @@ fn same_seed_same_answer_on_any_number_of_threads() {
     let with = |threads, seed| {
         run(
             &robot,
-            &Settings {
-                threads,
-                seed,
-                ..small(5)
-            },
+            &small(5).with(|set| {
+                set.threads = threads;
+                set.seed = seed;
+            }),
         )
         .unwrap()
         .trajectory
@@ -341,10 +331,7 @@ fn same_seed_same_answer_on_any_number_of_threads() {
 fn start_posture_is_kept() {
     let robot = Robot::load("planar2").unwrap();
     let start = vec![0.4, -0.7];
-    let settings = Settings {
-        start: Some(start.clone()),
-        ..small(2)
-    };
+    let settings = small(2).with(|set| set.start = Some(start.clone()));
     let d = run(&robot, &settings).unwrap();
     let mut q = vec![0.0; 2];
     d.trajectory.fourier.derivative(0, 0.0, &mut q);
@@ -383,60 +370,21 @@ fn impossible_problems_are_refused_with_the_reason() {
         Err(Error::Argument(m)) => assert!(m.contains(word), "{m}"),
         other => panic!("{word}: {:?}", other.map(|d| d.value)),
     };
+    argument(small(1).with(|set| set.period = 0.0), "period");
+    argument(small(1).with(|set| set.period = f64::NAN), "period");
+    argument(small(1).with(|set| set.harmonics = 1), "harmonics");
+    argument(small(1).with(|set| set.derate = 1.5), "derate");
+    argument(small(1).with(|set| set.periods = 0), "periods");
     argument(
-        Settings {
-            period: 0.0,
-            ..small(1)
-        },
-        "period",
-    );
-    argument(
-        Settings {
-            period: f64::NAN,
-            ..small(1)
-        },
-        "period",
-    );
-    argument(
-        Settings {
-            harmonics: 1,
-            ..small(1)
-        },
-        "harmonics",
-    );
-    argument(
-        Settings {
-            derate: 1.5,
-            ..small(1)
-        },
-        "derate",
-    );
-    argument(
-        Settings {
-            periods: 0,
-            ..small(1)
-        },
-        "periods",
-    );
-    argument(
-        Settings {
-            time_limit: Some(-1.0),
-            ..small(1)
-        },
+        small(1).with(|set| set.time_limit = Some(-1.0)),
         "time limit",
     );
     argument(
-        Settings {
-            start: Some(vec![0.0; 3]),
-            ..small(1)
-        },
+        small(1).with(|set| set.start = Some(vec![0.0; 3])),
         "posture",
     );
     argument(
-        Settings {
-            start: Some(vec![9.0; 7]),
-            ..small(1)
-        },
+        small(1).with(|set| set.start = Some(vec![9.0; 7])),
         "panda_joint1",
     );
 
@@ -481,14 +429,13 @@ fn what_is_not_certified_is_not_a_result() {
         (Criterion::D, 2),
         (Criterion::Condition, 1),
     ] {
-        let settings = Settings {
-            harmonics: 2,
-            period: 4.0,
-            ends: Ends::Free,
-            criterion,
-            seed,
-            ..small(2)
-        };
+        let settings = small(2).with(|set| {
+            set.harmonics = 2;
+            set.period = 4.0;
+            set.ends = Ends::Free;
+            set.criterion = criterion;
+            set.seed = seed;
+        });
         match run(&robot, &settings) {
             Ok(d) => {
                 let c = d.plant.certify(&d.trajectory.fourier, 1.0).unwrap();

@@ -19,10 +19,7 @@ const ROBOTS: [&str; 8] = [
 ];
 
 fn full() -> Settings {
-    Settings {
-        scale: 1.0,
-        ..Settings::default()
-    }
+    Settings::default().with(|set| set.scale = 1.0)
 }
 
 /// The limits with what a move assumes where none is stated.
@@ -169,10 +166,8 @@ fn random_moves_keep_every_limit_at_10_khz_and_are_time_optimal() {
         let limits = limits(&plant);
         let mut rng = ChaCha8Rng::seed_from_u64(r as u64);
         for k in 0..64 {
-            let settings = Settings {
-                scale: if k % 2 == 0 { 1.0 } else { 0.2 },
-                ..Settings::default()
-            };
+            let settings =
+                Settings::default().with(|set| set.scale = if k % 2 == 0 { 1.0 } else { 0.2 });
             let a = State::rest(&posture(robot, &mut rng));
             let b = match k % 3 {
                 0 => State::rest(&posture(robot, &mut rng)),
@@ -288,11 +283,10 @@ fn a_way_round_a_ball_is_found_and_proven() {
     assert!(free.via.is_empty() && free.clearance.is_none());
     assert!(sampled(&plant, &scene, &free) < 0.0);
     for scale in [0.2, 1.0] {
-        let settings = Settings {
-            scale,
-            rate: Some(250.0),
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| {
+            set.scale = scale;
+            set.rate = Some(250.0);
+        });
         let m = Move::plan(&plant, &from, &to, &settings, Some(&scene)).unwrap();
         let steps = m.duration * 250.0;
         assert!((steps - steps.round()).abs() < 1e-6 && m.slowed == 1.0);
@@ -327,10 +321,7 @@ fn what_walls_a_posture_in_is_named() {
     ];
     let (plant, scene) = among(&posts);
     let (from, to) = (State::rest(&[0.0, 0.0]), State::rest(&[2.0, 0.5]));
-    let settings = Settings {
-        tries: 300,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.tries = 300);
     let plan = |from: &State, to: &State| Move::plan(&plant, from, to, &settings, Some(&scene));
     let error = plan(&from, &to).unwrap_err();
     assert!(matches!(error, Error::Infeasible(_)));
@@ -381,10 +372,7 @@ fn torques_slow_a_move_down_and_what_cannot_be_held_is_named() {
     let mut robot = Robot::load("planar2").unwrap();
     // 31.9 N m hold the stretched arm
     robot.joints[0].limits.effort = 34.0;
-    let brisk = Settings {
-        scale: 0.3,
-        ..Settings::default()
-    };
+    let brisk = Settings::default().with(|set| set.scale = 0.3);
     let plant = Plant::from(&robot);
     let (from, to) = (State::rest(&[-0.3, 0.0]), State::rest(&[0.6, 0.0]));
     let free = Move::plan(&Plant::load("planar2").unwrap(), &from, &to, &brisk, None).unwrap();
@@ -425,10 +413,7 @@ fn missing_limits_and_unusable_states() {
     assert!(nan.contains("joint1") && nan.contains("not finite"));
     assert!(refused(&robot, &rest(&q[..6]), &rest(&q), &full()).contains("start"));
     for scale in [0.0, 1.1, f64::NAN, -1.0] {
-        let settings = Settings {
-            scale,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.scale = scale);
         assert!(refused(&robot, &rest(&q), &rest(&p), &settings).contains("share"));
     }
     robot.joints[2].limits.velocity = f64::INFINITY;

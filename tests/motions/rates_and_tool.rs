@@ -167,10 +167,7 @@ fn the_tool_point_keeps_its_limits() {
     }
     // a move with the same limits
     robot.tool = Some(tool(0.4, 2.0));
-    let settings = MoveSettings {
-        scale: 1.0,
-        ..MoveSettings::default()
-    };
+    let settings = MoveSettings::default().with(|set| set.scale = 1.0);
     let (from, to) = (State::rest(&[-0.6, 0.9]), State::rest(&[0.9, -0.8]));
     let there = Move::plan(&Plant::from(&robot), &from, &to, &settings, None).unwrap();
     let peak = there.tool.clone().unwrap();

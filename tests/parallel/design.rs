@@ -49,11 +49,10 @@ fn run(mechanism: &Mechanism, settings: &Settings) -> Design {
 }
 
 fn quick(starts: usize) -> Settings {
-    Settings {
-        starts: Some(starts),
-        condition: Condition::Normalised,
-        ..Settings::default()
-    }
+    Settings::default().with(|set| {
+        set.starts = Some(starts);
+        set.condition = Condition::Normalised;
+    })
 }
 
 #[test]
@@ -117,11 +116,10 @@ fn gradients_are_the_differences_of_the_criterion() {
 #[test]
 fn limits_hold_at_100_khz_for_designs_that_use_them() {
     let hexapod = hexapod().with_workspace(&[0.1, 0.1, 0.1, 0.25, 0.25, 0.25]);
-    let settings = Settings {
-        period: 4.0,
-        harmonics: 4,
-        ..quick(1)
-    };
+    let settings = quick(1).with(|set| {
+        set.period = 4.0;
+        set.harmonics = 4;
+    });
     let design = run(&hexapod, &settings);
     let c = hexapod.certify(&design.trajectory.fourier, 1.0).unwrap();
     assert!(c.satisfied, "{:?}", c.actuators.worst);
@@ -188,11 +186,10 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
     for (name, most) in [("delta", 40.0), ("h4", 40.0), ("hexapod", 150.0)] {
         let plant = bundled(name);
         let own = mechanism(&plant).in_actuators().unwrap();
-        let settings = Settings {
-            period: 4.0,
-            harmonics: 4,
-            ..quick(2)
-        };
+        let settings = quick(2).with(|set| {
+            set.period = 4.0;
+            set.harmonics = 4;
+        });
         let design = run(&own, &settings);
         let t = &design.trajectory;
         assert_eq!(t.space, Some(Space::Actuators));
@@ -254,11 +251,10 @@ fn actuators_that_are_redundant_have_no_series_of_their_own() {
 fn the_answer_does_not_depend_on_the_number_of_threads() {
     let plant = bundled("delta");
     let designed = [1, 2].map(|threads| {
-        let settings = Settings {
-            threads,
-            harmonics: 3,
-            ..quick(3)
-        };
+        let settings = quick(3).with(|set| {
+            set.threads = threads;
+            set.harmonics = 3;
+        });
         run(mechanism(&plant), &settings).trajectory.fourier
     });
     assert_eq!(designed[0], designed[1]);
@@ -295,11 +291,10 @@ fn conditions_are_well_below_those_of_random_multisines() {
             .build()
             .unwrap()
             .with_workspace(&[0.1, 0.1, 0.1, 0.25, 0.25, 0.25]);
-        let settings = Settings {
-            ends: Ends::Free,
-            time_limit: Some(30.0),
-            ..quick(8)
-        };
+        let settings = quick(8).with(|set| {
+            set.ends = Ends::Free;
+            set.time_limit = Some(30.0);
+        });
         let design = run(&m, &settings);
         let w = m
             .regressor(&excite::trajectory::sample_period(

@@ -362,13 +362,12 @@ fn a_five_bar_is_designed_in_its_actuators() {
     let m = five_bar(&POINT.replace("[[loop]]", &format!("{limits}[[loop]]"))).unwrap();
     assert_eq!(m.space(), Space::Actuators);
     assert_eq!(m.in_actuators().unwrap().task_names, m.task_names);
-    let settings = Settings {
-        starts: Some(2),
-        harmonics: 4,
-        period: 3.0,
-        condition: Condition::Normalised,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.starts = Some(2);
+        set.harmonics = 4;
+        set.period = 3.0;
+        set.condition = Condition::Normalised;
+    });
     let design = design(&Plant::from(&m), &settings).unwrap();
     let t = &design.trajectory;
     assert_eq!(t.space, Some(Space::Actuators));

@@ -221,13 +221,12 @@ fn it_is_judged_and_designed_like_those_that_come_with_the_program() {
     let base = m.base().unwrap();
     assert_eq!(base.count(), newton.base().unwrap().count());
     assert!(base.rank_gap > 1e6, "{:e}", base.rank_gap);
-    let settings = Settings {
-        starts: Some(2),
-        harmonics: 4,
-        period: 3.0,
-        condition: Condition::Normalised,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.starts = Some(2);
+        set.harmonics = 4;
+        set.period = 3.0;
+        set.condition = Condition::Normalised;
+    });
     let design = design(&Plant::from(&m), &settings).unwrap();
     let plant = Plant::from(m);
     let alone = assess(&plant, None).unwrap();

@@ -34,6 +34,25 @@ fn stages_show_names_and_no_modules() {
     }
 }
 
+/// Settings can gain a field without breaking a program that uses them: made by `default()`, changed by `with`.
+#[test]
+fn settings_can_grow() {
+    for stage in ["design", "identify", "load", "diagnose", "simulate"] {
+        let path = format!("{}/src/{stage}/settings.rs", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(path).expect("read");
+        assert!(
+            text.contains("#[non_exhaustive]\npub struct Settings"),
+            "{stage}"
+        );
+    }
+    let settings = Settings::default().with(|set| set.seed = 7);
+    assert_eq!(settings.seed, 7);
+    assert_eq!(
+        settings.with(|set| set.seed = Settings::default().seed),
+        Settings::default()
+    );
+}
+
 #[test]
 fn results_are_serialised() {
     fn serialisable<T: serde::Serialize>() {}
@@ -60,10 +79,7 @@ fn results_are_serialised() {
         written["parameters"].as_array().unwrap().len(),
         plant.values().len()
     );
-    let settings = Settings {
-        starts: Some(1),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.starts = Some(1));
     let found = design(&plant, &settings).unwrap();
     let designed = to_value(&found).unwrap();
     let file: Value = serde_json::from_str(&found.trajectory.to_json().unwrap()).unwrap();

@@ -260,10 +260,7 @@ fn the_derivation_is_an_option() {
     let record =
         Record::from_channels("made", channels, &plant, Purpose::Fit, Some(period)).unwrap();
     for derivation in [Derivation::LowPass, Derivation::Wiener] {
-        let settings = Settings {
-            derivation,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.derivation = derivation);
         let p = Prepared::new(&record, &plant, &settings).unwrap();
         for j in 0..2 {
             let off: f64 = (0..800)
@@ -277,10 +274,9 @@ fn the_derivation_is_an_option() {
             assert!(off < 0.2, "{derivation:?}: {off}");
         }
     }
-    let both = Settings {
-        derivation: Derivation::Wiener,
-        position_cutoff: Some(10.0),
-        ..Settings::default()
-    };
+    let both = Settings::default().with(|set| {
+        set.derivation = Derivation::Wiener;
+        set.position_cutoff = Some(10.0);
+    });
     assert!(Prepared::new(&record, &plant, &both).is_err());
 }

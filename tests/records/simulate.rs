@@ -51,12 +51,11 @@ fn frictionless(name: &str) -> Plant {
 }
 
 fn quick() -> Settings {
-    Settings {
-        rate: 250.0,
-        step: 5e-4,
-        lead_in: 0,
-        ..Settings::default()
-    }
+    Settings::default().with(|set| {
+        set.rate = 250.0;
+        set.step = 5e-4;
+        set.lead_in = 0;
+    })
 }
 
 #[test]
@@ -95,17 +94,14 @@ fn energy_balance() {
     ] {
         let plant = frictionless(name);
         let fourier = motion(&plant, 2.0, 0.5, 11);
-        let settings = Settings {
-            rate: 2000.0,
-            step,
-            lead_in: 0,
+        let settings = Settings::default().with(|set| {
+            set.rate = 2000.0;
+            set.step = step;
+            set.lead_in = 0;
+
             // a wrong start is what the feedback must work on
-            effects: Effects {
-                perturb: 0.3,
-                ..Effects::default()
-            },
-            ..Settings::default()
-        };
+            set.effects = Effects::default().with(|set| set.perturb = 0.3);
+        });
         let run = simulate(&plant, &fourier, 1, &settings, &|_| {}).unwrap();
         let effects = &settings.effects;
         let armature = effects.terms(&plant, 0).iter().map(|t| t[0]).collect();
@@ -185,12 +181,11 @@ fn inverse_dynamics_on_the_motion_gives_the_torque() {
 fn velocity_and_acceleration_are_derivatives() {
     let plant = Plant::load("ur10e").unwrap();
     let fourier = motion(&plant, 3.0, 0.5, 5);
-    let settings = Settings {
-        rate: 4000.0,
-        step: 2.5e-4,
-        lead_in: 0,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.rate = 4000.0;
+        set.step = 2.5e-4;
+        set.lead_in = 0;
+    });
     let run = simulate(&plant, &fourier, 1, &settings, &|_| {}).unwrap();
     let n = run.t.len();
     for j in 0..run.motion.dof {
@@ -228,12 +223,11 @@ fn a_joint_with_much_friction_sticks_and_breaks_away() {
         cos: vec![0.0],
     };
     let fourier = Fourier::new(4.0, vec![1], vec![still(0.4), still(0.02)]).unwrap();
-    let settings = Settings {
-        controller: Controller::Pd,
-        bandwidth: 3.0,
-        lead_in: 0,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.controller = Controller::Pd;
+        set.bandwidth = 3.0;
+        set.lead_in = 0;
+    });
     let run = simulate(&plant, &fourier, 2, &settings, &|_| {}).unwrap();
     let n = run.t.len();
     let (worst, stuck) = agreement(&plant, &run);
@@ -304,12 +298,11 @@ fn stribeck_friction_and_payload_show_in_the_torque() {
 fn sensors_round_and_add_noise_reproducibly() {
     let plant = Plant::load("panda").unwrap();
     let fourier = motion(&plant, 2.0, 0.4, 2);
-    let mut settings = Settings {
-        rate: 1000.0,
-        step: 1e-3,
-        lead_in: 0,
-        ..Settings::default()
-    };
+    let mut settings = Settings::default().with(|set| {
+        set.rate = 1000.0;
+        set.step = 1e-3;
+        set.lead_in = 0;
+    });
     settings.effects.torque_delay = 0.004;
     settings
         .effects
@@ -379,12 +372,11 @@ fn a_log_is_read_back() {
 fn achieved_spread_is_the_predicted_one_where_the_model_is_right() {
     let plant = frictionless("planar2");
     let fourier = motion(&plant, 2.0, 0.5, 4);
-    let settings = Settings {
-        rate: 500.0,
-        step: 1e-3,
-        lead_in: 0,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.rate = 500.0;
+        set.step = 1e-3;
+        set.lead_in = 0;
+    });
     let run = simulate(&plant, &fourier, 2, &settings, &|_| {}).unwrap();
     let (sensors, _) = Sensors::new(&plant, 1.0);
     let result = monte_carlo(&plant, &fourier, &run, &settings, &sensors, 200).unwrap();

@@ -141,11 +141,10 @@ fn a_certificate_says_how_it_is_known() {
 #[test]
 fn a_design_for_a_part_of_the_limits_keeps_that_part() {
     let plant = Plant::load("planar2").unwrap();
-    let settings = Settings {
-        starts: Some(1),
-        derate: 0.8,
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.starts = Some(1);
+        set.derate = 0.8;
+    });
     let motion = design(&plant, &settings).unwrap().trajectory.fourier;
     let used = |derate: f64| {
         let c = plant.certify(&motion, derate).unwrap();

@@ -309,10 +309,7 @@ fn what_is_meant_does_not_change_the_dynamics() {
 /// The design of the printed arm was spent on the two: condition number 671226 instead of 5.4.
 #[test]
 fn a_rounded_arm_is_excited_as_well_as_an_exact_one() {
-    let settings = Settings {
-        starts: Some(1),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.starts = Some(1));
     let condition = |numbers| {
         let robot = robot(&hobby_arm(numbers));
         let d = design(&Plant::from(robot.clone()), &settings).unwrap();
@@ -453,10 +450,7 @@ fn gripper(effort: f64, friction: f64) -> String {
 }
 
 fn designed(robot: &Robot) -> excite::Result<excite::design::Design> {
-    let settings = Settings {
-        starts: Some(1),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| set.starts = Some(1));
     design(&Plant::from(robot.clone()), &settings)
 }
 
@@ -532,11 +526,10 @@ fn a_load_that_leaves_no_motion_is_an_error() {
             excite::design::Criterion::A,
             excite::design::Criterion::E,
         ] {
-            let settings = Settings {
-                starts: Some(1),
-                criterion,
-                ..Settings::default()
-            };
+            let settings = Settings::default().with(|set| {
+                set.starts = Some(1);
+                set.criterion = criterion;
+            });
             let robot = robot(&text);
             match design(&Plant::from(robot.clone()), &settings) {
                 Ok(d) => assert!(d.value.is_finite()),

@@ -96,6 +96,7 @@ pub struct Estimate {
 
 /// One number of an effect.
 #[derive(Debug, Clone, serde::Serialize)]
+#[non_exhaustive]
 pub struct Value {
     /// name
     pub name: &'static str,

@@ -59,10 +59,7 @@ pub(in crate::identifiability) fn fill(
     scene: Option<&Scene>,
 ) -> Result<View> {
     let robot = plant.robot();
-    let tree = match plant.mechanism() {
-        None => motion.clone(),
-        Some(mechanism) => mechanism.motion(motion)?.tree,
-    };
+    let tree = plant.joint_motion(motion)?;
     let count = motion.count.max(1);
     let lines = |samples: &[usize]| {
         plant

@@ -87,11 +87,10 @@ fn bounds_hold_for_random_series() {
 /// A start and an end in motion, with jerk-limited moves in front of it and behind it.
 fn moves(trajectory: &Trajectory, rate: f64) -> [Move; 2] {
     let plant = Plant::load("planar2").unwrap();
-    let settings = Settings {
-        scale: 1.0,
-        rate: Some(rate),
-        ..Settings::default()
-    };
+    let settings = Settings::default().with(|set| {
+        set.scale = 1.0;
+        set.rate = Some(rate);
+    });
     let motion = &trajectory.fourier;
     let there = Move::approach(&plant, &[0.3, -0.2], motion, &settings, None).unwrap();
     let back = Move::retreat(&plant, motion, &[0.1, 0.4], &settings, None).unwrap();
