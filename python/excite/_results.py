@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _excite
 from ._arrays import Array, columns, from_columns, pandas
-from ._errors import Notice, notices, unusable
+from ._errors import Notice, emit, notices, unusable
 from ._records import Payload, Record
 from ._robot import PathLike, Robot
 from ._trajectory import Motion, Trajectory
@@ -102,6 +102,26 @@ class Result:
             if first in texts:
                 return Robot._from_files(texts, first)
         raise unusable("no robot file could be written; see .warnings")
+
+
+class _Model(Result):
+    """A result that is a model of the robot."""
+
+    def into(self, scene: PathLike, folder: PathLike, *, force: bool = False) -> Dict[str, Any]:
+        """Write a copy of your own MJCF or URDF with the model in it into a folder (``--into``).
+
+        Only what differs from the model is changed; comments, order, meshes and all else stay. Gives ``file``, and
+        ``changes``: ``file``, ``line``, ``element``, ``attribute``, ``old``, ``new``; ``left_out`` names what the format
+        has no place for. A result that was pickled or read from a folder has no model to write.
+        """
+        if self._report is None:
+            raise unusable("this result was read or copied; call the function again to write its model into a scene")
+        scene, folder = Path(os.fspath(scene)), Path(os.fspath(folder))
+        files, text, warnings = self._report.into_scene(scene, folder)
+        _excite.save(folder, [(name, content.encode()) for name, content in files], [], force)
+        value: Dict[str, Any] = json.loads(text)
+        emit(notices(warnings))
+        return value
 
 
 class Assessment(Result):
@@ -282,7 +302,7 @@ class Simulation:
         return f"<p>{_html.escape(repr(self)[1:-1])}</p><table>{head}{rows}</table>"
 
 
-class Identification(Result):
+class Identification(_Model):
     """An identified model."""
 
     _may = ("robot.urdf", "robot.xml", "robot.toml", "effects.py")
@@ -428,7 +448,7 @@ CONTROLLERS = {
 }
 
 
-class Diagnosis(Result):
+class Diagnosis(_Model):
     """Why a model and its robot disagree."""
 
     _file = "diagnosis.json"

@@ -115,6 +115,7 @@ pub fn design(
             warnings,
             files: Vec::new(),
             page: Arc::new(move || page::html(&assessment, Some(&record))),
+            scene: None,
         };
         Ok((report, text, motions, experiment))
     };
@@ -147,6 +148,7 @@ pub fn assess(py: Python<'_>, plant: &Plant, text: Option<String>) -> PyResult<R
             warnings: assessment.warnings.clone(),
             files: Vec::new(),
             page: Arc::new(move || page::html(&assessment, None)),
+            scene: None,
         })
     })
 }

@@ -2,10 +2,14 @@
 
 use crate::call::simply;
 use crate::error::{notices, to_python};
-use excite::Warning;
+use excite::export::Edited;
+use excite::{Error, Warning};
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// The model of a result written into a file of the user, for a folder.
+pub type Scene = Arc<dyn Fn(&Path, &Path) -> excite::Result<Edited> + Send + Sync>;
 
 /// The result of a stage.
 #[pyclass(frozen, module = "excite._excite")]
@@ -16,6 +20,8 @@ pub struct Report {
     pub files: Vec<(String, String)>,
     /// the page; made when it is asked for
     pub page: Arc<dyn Fn() -> String + Send + Sync>,
+    /// of a result that is a model
+    pub scene: Option<Scene>,
 }
 
 #[pymethods]
@@ -34,6 +40,40 @@ impl Report {
     #[getter]
     fn files(&self) -> Vec<(String, String)> {
         self.files.clone()
+    }
+
+    /// The model in a copy of an MJCF or URDF: names and texts of the files, what changed as JSON, warnings.
+    #[allow(clippy::type_complexity)]
+    fn into_scene(
+        &self,
+        py: Python<'_>,
+        scene: PathBuf,
+        folder: PathBuf,
+    ) -> PyResult<(
+        Vec<(String, String)>,
+        String,
+        Vec<(&'static str, String, String)>,
+    )> {
+        let write = self.scene.clone();
+        let edited = simply(py, move |_| match &write {
+            Some(write) => write(&scene, &folder),
+            None => Err(Error::Argument(
+                "the result is no model that a scene could hold".into(),
+            )),
+        })?;
+        let mut files: Vec<(String, String)> = edited
+            .files
+            .iter()
+            .map(|(name, text)| (name.display().to_string(), text.clone()))
+            .collect();
+        files.extend(
+            edited
+                .effects
+                .clone()
+                .map(|t| ("effects.py".to_string(), t)),
+        );
+        let json = serde_json::to_string(&edited).unwrap_or_default();
+        Ok((files, json, notices(&edited.warnings)))
     }
 
     fn html(&self, py: Python<'_>) -> PyResult<String> {
@@ -57,6 +97,9 @@ pub fn save(
     let work = || -> excite::Result<Vec<PathBuf>> {
         let paths = excite::output::prepare_dir(&folder, &names, force)?;
         for (path, (_, bytes)) in paths.iter().zip(&files) {
+            if let Some(parent) = path.parent() {
+                std::fs::create_dir_all(parent).map_err(|e| excite::Error::io(parent, e))?;
+            }
             excite::output::write_atomic(path, force, |w| w.write_all(bytes))?;
         }
         for path in paths.iter().skip(files.len()) {

@@ -9,7 +9,7 @@ use crate::records::Experiment;
 use crate::report::Report;
 use excite::cli::{export as program, identify as terms, pretty, unwritten};
 use excite::controller::{Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
-use excite::export::{Model, write};
+use excite::export::{Model, into_scene, write};
 use excite::robot::Prior;
 use excite::{Error, Result, calibrate as calibration, diagnose as diagnosis};
 use excite::{identify as identification, load as payload, signals};
@@ -83,7 +83,18 @@ pub fn identify(
             json: pretty(&report),
             warnings: id.warnings.clone(),
             files,
-            page: Arc::new(move || identification::page::html(&plant, &id, &settings)),
+            page: {
+                let plant = plant.clone();
+                Arc::new(move || identification::page::html(&plant, &id, &settings))
+            },
+            scene: Some(Arc::new(move |scene, folder| {
+                let model = Model {
+                    plant: &plant,
+                    robot: &robot,
+                    remarks: &[],
+                };
+                into_scene(&model, scene, folder)
+            })),
         })
     })
 }
@@ -140,6 +151,7 @@ pub fn load(
             warnings: found.warnings.clone(),
             files: texts(controllers.into()),
             page: Arc::new(move || payload::page::html(&found)),
+            scene: None,
         })
     })
 }
@@ -184,6 +196,17 @@ pub fn diagnose(
             json,
             warnings: d.warnings.clone(),
             files,
+            scene: Some({
+                let (plant, improved) = (core.plant.clone(), d.improved.clone());
+                Arc::new(move |scene, folder| {
+                    let model = Model {
+                        plant: &plant,
+                        robot: &improved.robot,
+                        remarks: &improved.remarks,
+                    };
+                    into_scene(&model, scene, folder)
+                })
+            }),
             page: Arc::new(move || diagnosis::page::html(&d)),
         })
     };
@@ -221,6 +244,7 @@ pub fn calibrate(
             warnings: found.warnings.clone(),
             files: own.map(|(n, t)| (n.to_string(), t.clone())).collect(),
             page: Arc::new(move || calibration::page::html(&found)),
+            scene: None,
         })
     })
 }

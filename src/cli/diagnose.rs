@@ -1,6 +1,6 @@
 //! `excite diagnose EXPERIMENT`.
 
-use super::{Folder, outside, pretty, print, unwritten, warn};
+use super::{Folder, into, outside, pretty, print, unwritten, warn};
 use excite::Result;
 use excite::diagnose::{Settings, diagnose, json, page};
 use excite::export::{self, Model};
@@ -30,6 +30,10 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
+    /// MJCF or URDF of the same robot, of which a copy with the result is written into the directory: only what
+    /// differs is changed, comments and order stay
+    #[arg(long, value_name = "SCENE")]
+    into: Option<PathBuf>,
     /// Do not design the next motion
     #[arg(long)]
     no_next: bool,
@@ -55,6 +59,8 @@ pub fn run(args: Args) -> Result<()> {
     experiment.press(outside(args.atmosphere)?)?;
     let mut names = vec!["diagnosis.json", "report.html", "next.json"];
     names.extend(export::files(&experiment.plant));
+    let scene = into::planned(&experiment.plant, args.into.as_deref(), &args.output)?;
+    names.extend(scene.iter().map(String::as_str));
     let folder = Folder::new(&args.output, &names, args.force)?;
     let settings = Settings {
         next: !args.no_next,
@@ -77,15 +83,19 @@ pub fn run(args: Args) -> Result<()> {
         robot: &d.improved.robot,
         remarks: &d.improved.remarks,
     };
-    let texts = export::write(&model);
+    let mut texts = export::write(&model);
+    let scene = into::edit(&model, args.into.as_deref(), &args.output, &mut texts)?;
     let mut more = model.warnings();
+    more.extend(into::warnings(scene.as_ref()));
     more.extend(unwritten(&texts, "diagnosis.json"));
     d.warnings.extend(more);
+    d.improved.scene = scene;
     warn(&d.warnings);
     let report = json::json(&d, begin.elapsed().as_secs_f64());
     folder.write("diagnosis.json", &pretty(&report))?;
     folder.write("report.html", &page::html(&d))?;
     folder.robot(texts)?;
+    into::save(&folder, d.improved.scene.as_ref())?;
     match &d.next {
         Some(n) => n.trajectory.write(folder.path("next.json"), args.force)?,
         None => folder.remove("next.json")?,
@@ -140,6 +150,7 @@ pub fn run(args: Args) -> Result<()> {
     if !changed.is_empty() {
         let _ = writeln!(out, "\nin MuJoCo\n{}", changed.join("\n"));
     }
+    out += &into::summary(d.improved.scene.as_ref());
     if let Some(n) = &d.next {
         let _ = writeln!(
             out,

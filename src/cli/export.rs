@@ -1,7 +1,8 @@
-//! `excite export TRAJECTORY --format …`.
+//! `excite export TRAJECTORY --format …`, and `excite export ROBOT --to …`.
 
-use super::{print, warn};
+use super::{Folder, into, print, unwritten, warn};
 use excite::controller::{Card, Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
+use excite::export::{Model, write};
 use excite::mechanism::bundled as parallel;
 use excite::output::write_atomic;
 use excite::robot::{Motion, bundled};
@@ -10,7 +11,7 @@ use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Write a trajectory in a file that the robot's controller reads.
+/// Write a trajectory in a file that the robot's controller reads, or a robot for a simulator.
 #[derive(clap::Args)]
 #[command(
     long_about = "Write a trajectory in a file that the robot's controller reads: ROS 2, Universal Robots, Franka, \
@@ -20,19 +21,28 @@ use std::path::{Path, PathBuf};
                   within 1e-5 rad or m, or within one step of the encoder.\n\nThe first run should be slow: --speed \
                   0.1 plays the same path at a tenth of the speed. Formats that are sent point by point need a \
                   motion that starts and ends at rest, or moves there and back (--approach, --return: CSV files \
-                  with the columns t, q1 …, dq1 …, ddq1 … of the actuators).",
+                  with the columns t, q1 …, dq1 …, ddq1 … of the actuators).\n\nWith --to, a robot is written instead: \
+                  mujoco (robot.xml) or urdf (robot.urdf) into the directory of --output. With --into, a copy of \
+                  your own MJCF or URDF has the values of the robot, and everything else stays as it is.",
     after_help = "Examples:\n  excite export out/trajectory.json --format urscript --speed 0.1\n  excite export \
                   out/trajectory.json --format ros2 --approach moves/approach.csv --return moves/return.csv\n  excite \
                   export out/trajectory.json --format csv --robot arm.urdf --rate 200 --unit deg --columns t,q\n  excite \
-                  export --list"
+                  export --list\n  excite export out/robot.toml --to mujoco --into scene.xml --output better"
 )]
 pub struct Args {
-    /// trajectory.json of `excite design`
+    /// trajectory.json of `excite design`; with --to a bundled robot, robot.toml, URDF or MJCF
     #[arg(required_unless_present = "list")]
     trajectory: Option<PathBuf>,
     /// Format of the file, one of --list
-    #[arg(short, long, value_name = "NAME", required_unless_present = "list")]
+    #[arg(short, long, value_name = "NAME", required_unless_present_any = ["list", "to"])]
     format: Option<String>,
+    /// Write a robot for a simulator in place of a trajectory
+    #[arg(long, value_name = "NAME", value_parser = ["mujoco", "urdf"], conflicts_with_all = ["format", "list", "robot",
+        "rate", "periods", "speed", "approach", "retreat", "joints", "columns", "unit", "move_to_start"])]
+    to: Option<String>,
+    /// With --to: MJCF or URDF of the same robot, of which a copy with the values of the robot is written
+    #[arg(long, value_name = "SCENE", requires = "to")]
+    into: Option<PathBuf>,
     /// Print the formats
     #[arg(long)]
     list: bool,
@@ -67,7 +77,7 @@ pub struct Args {
     /// Begin the program with a slow move to the start (urscript, xarm); nobody looks for obstacles
     #[arg(long)]
     move_to_start: bool,
-    /// File to write [default: TRAJECTORY_FORMAT.EXTENSION beside the trajectory]
+    /// File to write [default: TRAJECTORY_FORMAT.EXTENSION beside the trajectory]; with --to the directory [default: out]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Replace files that exist
@@ -76,6 +86,9 @@ pub struct Args {
 }
 
 pub fn run(args: Args) -> Result<()> {
+    if let (Some(to), Some(spec)) = (&args.to, &args.trajectory) {
+        return robot_to(&args, to, &spec.to_string_lossy());
+    }
     let (Some(path), Some(name), false) = (&args.trajectory, &args.format, args.list) else {
         return print(&list());
     };
@@ -146,6 +159,62 @@ pub fn run(args: Args) -> Result<()> {
     for (file, bytes) in &files {
         write_atomic(file, args.force, |w| w.write_all(bytes))?;
         let _ = writeln!(out, "wrote {} ({} bytes)", file.display(), bytes.len());
+    }
+    print(&out)
+}
+
+/// Writes a robot for a simulator.
+fn robot_to(args: &Args, to: &str, spec: &str) -> Result<()> {
+    let plant = Plant::load(spec)?;
+    let file = match to {
+        "mujoco" => "robot.xml",
+        _ => "robot.urdf",
+    };
+    let output = args.output.clone().unwrap_or("out".into());
+    let model = Model {
+        plant: &plant,
+        robot: plant.robot(),
+        remarks: &[],
+    };
+    let mut texts = write(&model);
+    texts.retain(|(name, _)| *name == file);
+    let scene = into::edit(&model, args.into.as_deref(), &output, &mut texts)?;
+    let names = scene.as_ref().map(|s| s.names()).unwrap_or_default();
+    // a robot of the user's own file is in that file
+    let texts = if scene.is_some() { Vec::new() } else { texts };
+    if scene.is_none() && texts.is_empty() {
+        return Err(Error::Infeasible(format!(
+            "{spec}: closed chains are not written for {to}"
+        )));
+    }
+    let mut all: Vec<&str> = names.iter().map(String::as_str).collect();
+    all.extend(texts.iter().map(|(name, _)| *name));
+    let mut warnings = plant.warnings().to_vec();
+    warnings.extend(model.warnings());
+    warnings.extend(unwritten(&texts, "the robot"));
+    warnings.extend(into::warnings(scene.as_ref()));
+    warn(&warnings);
+    let folder = Folder::new(&output, &all, args.force)?;
+    let mut written = into::save(&folder, scene.as_ref())?;
+    for (name, text) in texts {
+        written.push(folder.write(name, &text?)?);
+    }
+    let mut out = String::new();
+    for c in scene.iter().flat_map(|s| &s.changes) {
+        let none = "none".to_string();
+        let _ = writeln!(
+            out,
+            "{}:{}: {} {}: {} -> {}",
+            c.file,
+            c.line,
+            c.element,
+            c.attribute,
+            c.old.as_ref().unwrap_or(&none),
+            c.new.as_ref().unwrap_or(&none)
+        );
+    }
+    for file in written {
+        let _ = writeln!(out, "wrote {}", file.display());
     }
     print(&out)
 }

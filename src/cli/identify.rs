@@ -1,6 +1,6 @@
 //! `excite identify EXPERIMENT`.
 
-use super::{Folder, outside, pretty, print, unwritten, warn};
+use super::{Folder, into, outside, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
 use excite::identify::page;
 use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
@@ -30,6 +30,10 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
+    /// MJCF or URDF of the same robot, of which a copy with the result is written into the directory: only what
+    /// differs is changed, comments and order stay
+    #[arg(long, value_name = "SCENE")]
+    into: Option<PathBuf>,
     /// Estimator of the base parameters: ols, wls (full covariance between joints), robust (Huber,
     /// Tukey), ml (maximum likelihood from the scatter of periods), iv (instrumental variables
     /// from the commanded motion)
@@ -98,6 +102,8 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.measured_rates = !args.derive;
     let mut names = vec!["model.json", "report.json", "report.html"];
     names.extend(export::files(&experiment.plant));
+    let scene = into::planned(&experiment.plant, args.into.as_deref(), &args.output)?;
+    names.extend(scene.iter().map(String::as_str));
     let folder = Folder::new(&args.output, &names, args.force)?;
 
     let plant = &experiment.plant;
@@ -111,7 +117,9 @@ pub fn run(args: Args) -> Result<()> {
         robot: &robot,
         remarks: &[],
     };
-    let texts = export::write(&model);
+    let mut texts = export::write(&model);
+    id.scene = into::edit(&model, args.into.as_deref(), &args.output, &mut texts)?;
+    id.warnings.extend(into::warnings(id.scene.as_ref()));
     id.warnings.extend(model.warnings());
     id.warnings.extend(unwritten(&texts, "model.json"));
     warn(&id.warnings);
@@ -125,16 +133,16 @@ pub fn run(args: Args) -> Result<()> {
     );
     let mut written = vec![folder.write("model.json", &pretty(&json::model(plant, &id)))?];
     written.extend(folder.robot(texts)?);
+    written.extend(into::save(&folder, id.scene.as_ref())?);
     written.push(folder.write("report.json", &pretty(&report))?);
     written.push(folder.write("report.html", &page::html(plant, &id, &settings))?);
     match args.json {
         true => print(&pretty(&report)),
-        false => print(&summary(
-            &id,
-            &verdict,
-            &written,
-            begin.elapsed().as_secs_f64(),
-        )),
+        false => {
+            let mut out = summary(&id, &verdict, &written, begin.elapsed().as_secs_f64());
+            out += &into::summary(id.scene.as_ref());
+            print(&out)
+        }
     }
 }
 

@@ -7,6 +7,7 @@ mod diagnose;
 pub mod export;
 mod identifiability;
 pub mod identify;
+mod into;
 mod load;
 mod log;
 mod moves;

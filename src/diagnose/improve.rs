@@ -35,6 +35,8 @@ pub struct Improved {
     pub in_mujoco: Vec<String>,
     /// names of the robot files that hold it
     pub files: Vec<&'static str>,
+    /// a file of the user with the model in it
+    pub scene: Option<export::Edited>,
 }
 
 /// The robot with the parameters `phi`, and of the findings what was claimed.
@@ -88,6 +90,7 @@ pub fn improve(
         robot,
         remarks,
         files,
+        scene: None,
     };
     (improved, warnings)
 }

@@ -195,6 +195,9 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         "warnings": d.warnings,
         "seconds": number(seconds),
     });
+    if let Some(scene) = &d.improved.scene {
+        out["into"] = json!(scene);
+    }
     if let Some(n) = &d.next {
         out["next_experiment"] = json!({
             "separates": n.separates,

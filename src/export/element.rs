@@ -4,6 +4,8 @@
 //! says which of these it has ([`Format::element`](super::Format::element)). What no format has an element for is a
 //! [`Function`], which `effects.py` holds.
 
+use crate::robot::Inertia;
+
 /// Name of the file of functions.
 pub const FUNCTIONS: &str = "effects.py";
 
@@ -77,6 +79,13 @@ pub enum Element {
         /// inertia of the base itself, kg m²
         inertia: [f64; 2],
     },
+    /// a body that hangs on another one, in whose inertia it is contained
+    Load {
+        /// index of the body
+        body: usize,
+        /// in and about its frame
+        inertia: Inertia,
+    },
     /// anything else
     Function(Function),
 }
@@ -135,7 +144,10 @@ impl Element {
     pub fn is_function(&self) -> bool {
         !matches!(
             self,
-            Element::Drag { .. } | Element::Spring { .. } | Element::Coupling { .. }
+            Element::Drag { .. }
+                | Element::Spring { .. }
+                | Element::Coupling { .. }
+                | Element::Load { .. }
         )
     }
 
@@ -193,6 +205,7 @@ impl Element {
             Element::Twist { gap, .. } if *gap == 0.0 => "a second joint on a spring",
             Element::Twist { .. } => "a second joint, and the force of its flanks",
             Element::Base { .. } => "a base on springs",
+            Element::Load { .. } => "inertial of the bodies",
             Element::Function(f) => match f.kind {
                 Kind::Torque => "a torque",
                 Kind::Memory => "a torque with a memory",

@@ -7,6 +7,8 @@
 //! | `effects.py` | `effects` | what MuJoCo has no element for, as functions of state and time step | serial |
 //! | `robot.toml` | `robot_toml`, [`mechanism`] | what the other commands read, geometry and loops included | all |
 //!
+//! [`into_scene`] writes a model into an MJCF or URDF of its user, where only what differs is changed.
+//!
 //! A new format is one file with an implementation of [`Format`], and one line in [`FORMATS`]. What a model
 //! has and a format cannot hold stands in it as a comment ([`Remark`]). The bodies that are written can
 //! exist: masses are positive and principal moments fulfil the triangle inequality ([`possible`]).
@@ -18,6 +20,7 @@ pub mod mechanism;
 pub(crate) mod mujoco;
 pub(crate) mod remark;
 pub(crate) mod robot_toml;
+pub(crate) mod scene;
 pub(crate) mod simulator;
 #[doc(hidden)]
 pub mod urdf;
@@ -26,6 +29,8 @@ pub mod urdf;
 pub use element::{Element, Form};
 #[doc(hidden)]
 pub use remark::Remark;
+pub(crate) use scene::page as scene_page;
+pub use scene::{Change, Edited, into_scene};
 
 use crate::error::{Result, Warning, WarningKind};
 use crate::plant::{Column, Plant};

@@ -7,12 +7,13 @@
 
 mod joint;
 
+pub(super) use joint::{OnJoint, spring};
+
 use super::element::{Element, Form, Kind};
 use super::{Format, LEAST, Model, Part, bounded, escape, possible, remark, xml_comment};
 use crate::error::Result;
 use crate::plant::Plant;
 use crate::robot::{Body, Inertia, JointTerm, Motion, Robot};
-use joint::OnJoint;
 use nalgebra::UnitQuaternion;
 use std::fmt::Write;
 
@@ -21,6 +22,11 @@ pub struct Mujoco;
 
 /// Step of the simulation, s.
 const STEP: f64 = 1e-3;
+/// The shortest reference of dry friction; the engine raises it to two steps where a scene has longer ones.
+pub(super) const STIFF: [(&str, &str); 2] = [
+    ("solreffriction", "0.0001 1"),
+    ("solimpfriction", "0.99 0.99 0.001"),
+];
 /// Least dry friction of a joint whose level a function sets, N m or N: the constraint is there from above zero on.
 const SOME_FRICTION: f64 = 1e-9;
 
@@ -44,7 +50,7 @@ impl Format for Mujoco {
     fn element(&self, element: &Element) -> Form {
         let native = match element {
             Element::Drag { .. } | Element::Spring { .. } => true,
-            Element::Gain { .. } | Element::Base { .. } => true,
+            Element::Gain { .. } | Element::Base { .. } | Element::Load { .. } => true,
             Element::Coupling { coulomb, .. } => *coulomb >= 0.0,
             // an actuator can act late; what is reported late is no part of the machine
             Element::Delay { seconds, .. } => *seconds < 0.0,
@@ -67,6 +73,13 @@ impl Format for Mujoco {
     }
 }
 
+/// The attributes of [`STIFF`].
+pub(super) fn stiff() -> String {
+    STIFF
+        .map(|(name, value)| format!("{name}=\"{value}\""))
+        .join(" ")
+}
+
 /// Name of the joint by which the link of a joint stands behind a spring.
 pub(crate) fn twist_joint(robot: &Robot, joint: usize) -> String {
     free_name(robot, format!("{}_twist", robot.joints[joint].name))
@@ -78,7 +91,7 @@ pub(crate) fn base_joints(robot: &Robot) -> [String; 2] {
 }
 
 /// A name that no joint and no body has.
-fn free_name(robot: &Robot, mut name: String) -> String {
+pub(super) fn free_name(robot: &Robot, mut name: String) -> String {
     let taken = |name: &str| {
         robot
             .bodies
@@ -93,7 +106,7 @@ fn free_name(robot: &Robot, mut name: String) -> String {
 
 /// A body that MuJoCo takes: it refuses bodies without mass or with a principal moment of zero, and compares moments
 /// without tolerance. One without mass becomes a milligram of a millimetre, a point or thin rod 0.03 mm thick.
-fn solid(inertia: &Inertia) -> Inertia {
+pub(super) fn solid(inertia: &Inertia) -> Inertia {
     let able = possible(inertia);
     match able.mass() == 0.0 {
         true => bounded(
@@ -106,14 +119,16 @@ fn solid(inertia: &Inertia) -> Inertia {
 }
 
 /// A model in the elements of MuJoCo.
-struct Parts<'a> {
-    joints: Vec<OnJoint>,
-    couplings: Vec<&'a Element>,
-    base: Option<&'a Element>,
+pub(super) struct Parts<'a> {
+    pub(super) joints: Vec<OnJoint>,
+    pub(super) couplings: Vec<&'a Element>,
+    pub(super) base: Option<&'a Element>,
+    /// bodies that hang on others: the body they hang on, and they
+    pub(super) loads: Vec<(usize, Inertia)>,
 }
 
 impl<'a> Parts<'a> {
-    fn of(model: &Model<'a>) -> Self {
+    pub(super) fn of(model: &Model<'a>) -> Self {
         let plain = |j: &crate::robot::Joint| OnJoint {
             armature: j.terms[JointTerm::Armature as usize],
             damping: [j.terms[JointTerm::Viscous as usize], 0.0, 0.0],
@@ -126,6 +141,7 @@ impl<'a> Parts<'a> {
             joints: model.robot.joints.iter().map(plain).collect(),
             couplings: Vec::new(),
             base: None,
+            loads: Vec::new(),
         };
         for element in model.remarks.iter().filter_map(|r| r.element.as_ref()) {
             let joints = &mut out.joints;
@@ -169,6 +185,8 @@ impl<'a> Parts<'a> {
                     joints[*joint].twist = Some(if *gap > 0.0 { [0.0; 3] } else { spring });
                 }
                 Element::Base { .. } => out.base = Some(element),
+                // in the inertia of the body already
+                Element::Load { body, inertia } => out.loads.push((*body, *inertia)),
                 Element::Function(f) => {
                     if matches!(f.kind, Kind::Torque | Kind::Memory) {
                         let dry = &mut joints[f.joint].coulomb;
@@ -181,7 +199,7 @@ impl<'a> Parts<'a> {
     }
 
     /// Which versions of MuJoCo read this file.
-    fn versions(&self) -> Vec<String> {
+    pub(super) fn versions(&self) -> Vec<String> {
         let curved = |j: &OnJoint| {
             j.damping[1..]
                 .iter()
@@ -203,7 +221,7 @@ impl<'a> Parts<'a> {
     }
 
     /// What is not in the file, nor elsewhere.
-    fn left_out(&self, robot: &Robot) -> Vec<String> {
+    pub(super) fn left_out(&self, robot: &Robot) -> Vec<String> {
         let below = |(j, on): (usize, &OnJoint)| {
             (on.coulomb < 0.0).then(|| {
                 format!(
@@ -237,9 +255,8 @@ impl<'a> Parts<'a> {
             g.y,
             g.z
         );
-        // the shortest reference is two steps; the engine raises it to that where a scene has longer ones
         if self.joints.iter().any(|j| j.coulomb > 0.0) || !self.couplings.is_empty() {
-            let stiff = "solreffriction=\"0.0001 1\" solimpfriction=\"0.99 0.99 0.001\"";
+            let stiff = stiff();
             let _ = writeln!(
                 out,
                 "  <default>\n    <joint {stiff}/>\n    <tendon {stiff}/>\n  </default>"

@@ -12,6 +12,8 @@ use faer::Mat;
 #[derive(Debug, Clone, serde::Serialize)]
 #[non_exhaustive]
 pub struct Identification {
+    /// a file of the user with the model in it
+    pub scene: Option<crate::export::Edited>,
     /// base parameters of the plant
     pub base: BaseParameters,
     /// estimate of the base parameters by the method alone

@@ -98,7 +98,7 @@ pub fn report(
             )
         })
         .collect();
-    json!({
+    let mut out = json!({
         "robot": plant.name(),
         "joints": plant.actuators().iter().map(|j| j.name.as_str()).collect::<Vec<_>>(),
         "verdict": verdict,
@@ -134,7 +134,11 @@ pub fn report(
         "records": records(id),
         "warnings": id.warnings,
         "seconds": seconds,
-    })
+    });
+    if let Some(scene) = &id.scene {
+        out["into"] = json!(scene);
+    }
+    out
 }
 
 /// `model.json`: everything that another program needs to use the model.

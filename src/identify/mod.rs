@@ -102,6 +102,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
     let validation = validation::validate(&equations, models.map(Vec::as_slice))?;
 
     let mut found = Identification {
+        scene: None,
         std: normal.std(),
         predicted_std: uncertainty::predicted(plant, &fit.stacks())?,
         residual_covariance: weights::residual_covariance(&fit.stacks(), &normal.pi),

@@ -34,6 +34,13 @@ pub fn html(plant: &Plant, id: &Identification, settings: &Settings) -> String {
         signals::section(id),
         joints::order(plant.actuators().iter().map(|j| j.name.as_str())),
     ];
+    if let Some(scene) = &id.scene {
+        let last = sections.len() - 1;
+        sections.insert(
+            last,
+            Section::new("In your simulator", crate::export::scene_page(scene)),
+        );
+    }
     if !id.warnings.is_empty() {
         let list = html! { ul { @for w in &id.warnings { li { strong { (w.subject) } ": " (w.message) } } } };
         let mut s = Section::new("Warnings", list);

@@ -58,16 +58,16 @@ pub struct StatedLimits {
 pub struct Urdf {
     /// `name` of `<robot>`; empty where it has none
     pub name: String,
-    pub(super) file: PathBuf,
-    pub(super) links: Vec<Link>,
-    pub(super) joints: Vec<UrdfJoint>,
-    pub(super) warnings: Vec<Warning>,
+    pub(crate) file: PathBuf,
+    pub(crate) links: Vec<Link>,
+    pub(crate) joints: Vec<UrdfJoint>,
+    pub(crate) warnings: Vec<Warning>,
     /// acceleration of gravity in base axes, m/s²
-    pub(super) gravity: Vector3<f64>,
+    pub(crate) gravity: Vector3<f64>,
 }
 
 /// The standard gravity, m/s².
-pub(super) const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+pub(crate) const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 
 impl Urdf {
     /// Reads the text of a URDF; `file` is what errors call it.
@@ -162,20 +162,20 @@ impl Urdf {
 
 /// `<link>`.
 #[derive(Debug, Clone)]
-pub(super) struct Link {
-    pub(super) name: String,
-    pub(super) line: usize,
+pub(crate) struct Link {
+    pub(crate) name: String,
+    pub(crate) line: usize,
     /// about the origin and in the axes of the link frame; `None` without `<inertial>`
-    pub(super) inertia: Option<Inertia>,
+    pub(crate) inertia: Option<Inertia>,
     /// geometry in its frame
-    pub(super) forms: Vec<Form>,
+    pub(crate) forms: Vec<Form>,
     /// to be reported if the link turns out to move
-    pub(super) warnings: Vec<Warning>,
+    pub(crate) warnings: Vec<Warning>,
 }
 
 /// `type` of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Revolute,
     Continuous,
     Prismatic,
@@ -186,49 +186,49 @@ pub(super) enum Kind {
 
 /// `<joint>`.
 #[derive(Debug, Clone)]
-pub(super) struct UrdfJoint {
-    pub(super) name: String,
-    pub(super) line: usize,
-    pub(super) kind: Kind,
-    pub(super) parent: String,
-    pub(super) child: String,
-    pub(super) rotation: Matrix3<f64>,
-    pub(super) position: Vector3<f64>,
+pub(crate) struct UrdfJoint {
+    pub(crate) name: String,
+    pub(crate) line: usize,
+    pub(crate) kind: Kind,
+    pub(crate) parent: String,
+    pub(crate) child: String,
+    pub(crate) rotation: Matrix3<f64>,
+    pub(crate) position: Vector3<f64>,
     /// unit length
-    pub(super) axis: Vector3<f64>,
+    pub(crate) axis: Vector3<f64>,
     /// the three as they are meant
-    pub(super) meant: Placement,
-    pub(super) limit: Option<Limit>,
-    pub(super) by_position: Option<ByPosition>,
-    pub(super) mimic: Option<Mimic>,
-    pub(super) damping: f64,
-    pub(super) friction: f64,
-    pub(super) armature: f64,
+    pub(crate) meant: Placement,
+    pub(crate) limit: Option<Limit>,
+    pub(crate) by_position: Option<ByPosition>,
+    pub(crate) mimic: Option<Mimic>,
+    pub(crate) damping: f64,
+    pub(crate) friction: f64,
+    pub(crate) armature: f64,
 }
 
 /// `<limit>`, as written.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limit {
-    pub(super) line: usize,
-    pub(super) lower: Option<f64>,
-    pub(super) upper: Option<f64>,
-    pub(super) velocity: Option<f64>,
-    pub(super) effort: Option<f64>,
+pub(crate) struct Limit {
+    pub(crate) line: usize,
+    pub(crate) lower: Option<f64>,
+    pub(crate) upper: Option<f64>,
+    pub(crate) velocity: Option<f64>,
+    pub(crate) effort: Option<f64>,
 }
 
 /// `<position_based_velocity_limits>` of Franka's robot descriptions, as written.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ByPosition {
-    pub(super) line: usize,
-    pub(super) deceleration: Option<f64>,
-    pub(super) offset: Option<f64>,
+pub(crate) struct ByPosition {
+    pub(crate) line: usize,
+    pub(crate) deceleration: Option<f64>,
+    pub(crate) offset: Option<f64>,
 }
 
 /// `<mimic>`: `q = multiplier · q_joint + offset`.
 #[derive(Debug, Clone)]
-pub(super) struct Mimic {
-    pub(super) line: usize,
-    pub(super) joint: String,
-    pub(super) multiplier: f64,
-    pub(super) offset: f64,
+pub(crate) struct Mimic {
+    pub(crate) line: usize,
+    pub(crate) joint: String,
+    pub(crate) multiplier: f64,
+    pub(crate) offset: f64,
 }

@@ -9,6 +9,7 @@ mod export;
 mod files;
 mod geometry;
 mod identities;
+mod into;
 mod mjcf;
 mod plant;
 mod rank;

@@ -51,16 +51,16 @@ impl Effect for Payload {
 
     fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {
         let b = cx.data.plant.tool()?;
-        let load = Inertia(std::array::from_fn(|k| {
-            e.eta.get(k).copied().unwrap_or(0.0)
-        }));
-        let load = match (e.shape.form, load.com()) {
-            // what was fitted is a mass and its moments; the inertia is that of a point
-            (POINT, Some(c)) => Inertia::from_com(load.mass(), c, Default::default()),
-            _ => load,
-        };
+        let load = load(e);
         robot.bodies[b].inertia = robot.bodies[b].inertia + load;
         Some(Part::Bodies)
+    }
+
+    fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
+        Some(Element::Load {
+            body: cx.data.plant.tool()?,
+            inertia: load(e),
+        })
     }
 
     fn columns(&self, cx: &Context, _place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
@@ -117,5 +117,17 @@ impl Effect for Payload {
             value("com_y", y, sy, "m"),
             value("com_z", z, sz, "m"),
         ]
+    }
+}
+
+/// The load as a body.
+fn load(e: &Estimate) -> Inertia {
+    let load = Inertia(std::array::from_fn(|k| {
+        e.eta.get(k).copied().unwrap_or(0.0)
+    }));
+    match (e.shape.form, load.com()) {
+        // what was fitted is a mass and its moments; the inertia is that of a point
+        (POINT, Some(c)) => Inertia::from_com(load.mass(), c, Default::default()),
+        _ => load,
     }
 }

@@ -26,6 +26,7 @@ pub(super) fn simulators(d: &Diagnosis) -> Markup {
                 code { "effects.inverse(model, q, dq, ddq, dt)" } " gives the torque along a motion with all of it."
             }
         }
+        @if let Some(scene) = &d.improved.scene { (crate::export::scene_page(scene)) }
         @match rows.is_empty() {
             true => p { "No effect is claimed, so that nothing else is in them." },
             false => (table(&["effect", "where", "in MuJoCo", "with"], &[1, 2, 3], &rows)),

@@ -255,6 +255,9 @@ fn add(
                 }
             }
         }
-        Element::Drag { .. } | Element::Spring { .. } | Element::Coupling { .. } => {}
+        Element::Drag { .. }
+        | Element::Spring { .. }
+        | Element::Coupling { .. }
+        | Element::Load { .. } => {}
     }
 }

@@ -7,28 +7,28 @@ const FAR: f64 = 1e-6;
 
 /// What stands on a joint.
 #[derive(Debug, Clone, Default)]
-pub(super) struct OnJoint {
-    pub(super) armature: f64,
+pub(crate) struct OnJoint {
+    pub(crate) armature: f64,
     /// of `q̇`, `q̇ |q̇|`, `q̇³`
-    pub(super) damping: [f64; 3],
-    pub(super) coulomb: f64,
+    pub(crate) damping: [f64; 3],
+    pub(crate) coulomb: f64,
     /// of `1`, `q`, `q²`, `q³`
-    pub(super) spring: [f64; 4],
+    pub(crate) spring: [f64; 4],
     /// stiffness, its third power, damping; of a spring that the file states
-    pub(super) twist: Option<[f64; 3]>,
-    pub(super) gain: f64,
+    pub(crate) twist: Option<[f64; 3]>,
+    pub(crate) gain: f64,
     /// s
-    pub(super) delay: f64,
+    pub(crate) delay: f64,
 }
 
 impl OnJoint {
     /// Whether its spring has no position of rest, which MuJoCo's have.
-    pub(super) fn never_rests(&self) -> bool {
+    pub(crate) fn never_rests(&self) -> bool {
         self.spring != [0.0; 4] && spring(self.spring).is_none()
     }
 
     /// Its attributes in the file.
-    pub(super) fn attributes(&self) -> String {
+    pub(crate) fn attributes(&self) -> String {
         let mut out = String::new();
         let used = |x: &[f64]| x.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
         let list = |x: &[f64]| -> String {
@@ -58,7 +58,7 @@ impl OnJoint {
 
 /// A torque `Σ c_k q^k` as a spring: the factors of the first three powers of the way from where it is zero, and
 /// that position. `None` where there is no torque, or none is zero anywhere.
-fn spring(c: [f64; 4]) -> Option<([f64; 3], f64)> {
+pub(crate) fn spring(c: [f64; 4]) -> Option<([f64; 3], f64)> {
     if c == [0.0; 4] {
         return None;
     }

@@ -37,9 +37,27 @@ impl Frame {
     }
 }
 
+/// A body of the file, and the link that it became.
+#[derive(Debug, Clone)]
+pub struct Part<'a> {
+    /// name of the link
+    pub link: String,
+    pub node: &'a Node,
+    /// origin of the link in the frame of the body, m
+    pub anchor: Vector3<f64>,
+    /// whether its inertia could be told
+    pub known: bool,
+    /// its joints, with the defaults of their classes, and their names
+    pub joints: Vec<(String, Element<'a>)>,
+}
+
 /// Collects links and joints.
 pub struct Reader<'a> {
     compiler: &'a Compiler,
+    /// whether an inertia that cannot be told (that of a mesh) is left out in place of refused
+    pub lenient: bool,
+    /// bodies, parents before children
+    pub parts: Vec<Part<'a>>,
     pub links: Vec<Link>,
     pub joints: Vec<UrdfJoint>,
     pub warnings: Vec<Warning>,
@@ -63,6 +81,8 @@ impl<'a> Reader<'a> {
     pub fn new(compiler: &'a Compiler) -> Self {
         Reader {
             compiler,
+            lenient: false,
+            parts: Vec::new(),
             links: Vec::new(),
             joints: Vec::new(),
             warnings: Vec::new(),
@@ -195,12 +215,16 @@ impl<'a> Reader<'a> {
         self.joints_in(node, class.as_deref(), Frame::ZERO, &mut joints)?;
         let moves = place.moves || !joints.is_empty();
         // that of what stands matters only for the sum of all masses
-        let inertia = match moves || self.compiler.total_mass.is_some() {
-            true => self.inertia(node, class.as_deref(), &name)?,
-            false => Inertia::default(),
+        let (inertia, known) = match moves || self.compiler.total_mass.is_some() {
+            true => match self.inertia(node, class.as_deref(), &name) {
+                Err(_) if self.lenient => (Inertia::default(), false),
+                told => (told?, true),
+            },
+            false => (Inertia::default(), true),
         };
         // the frame of the body on the link that carries it, and the last joint's place on the body
         let (mut parent, mut on, mut anchor) = (place.link.clone(), frame, Vector3::zeros());
+        let mut of_body = Vec::new();
         for (k, &(joint, turned)) in joints.iter().enumerate() {
             let at = joint.vector("pos")?.unwrap_or_default();
             let at = turned.position + turned.rotation * at;
@@ -211,6 +235,8 @@ impl<'a> Reader<'a> {
             };
             let on_parent = on.then(&Matrix3::identity(), &(at - anchor));
             self.joint(&joint, &turned, &parent, &link, on_parent)?;
+            let called = self.joints.last().map(|j| j.name.clone());
+            of_body.push((called.unwrap_or_default(), joint));
             if !last {
                 self.link(link.clone(), node, Some(Inertia::default()));
             }
@@ -229,6 +255,13 @@ impl<'a> Reader<'a> {
                 frame,
             ));
         }
+        self.parts.push(Part {
+            link: name.clone(),
+            node,
+            anchor,
+            known,
+            joints: of_body,
+        });
         let inertia = inertia.in_parent(&Matrix3::identity(), &-anchor);
         self.link(name.clone(), node, Some(inertia));
         let place = Place {

@@ -9,10 +9,10 @@
 //! Bodies that float, ball joints, closures and inertia of meshes are refused with the line where they stand. Springs
 //! and tendons are no part of a model here; a warning says where some are left out.
 
-mod body;
-mod compiler;
+pub(crate) mod body;
+pub(crate) mod compiler;
 mod geom;
-mod xml;
+pub(crate) mod xml;
 
 use super::urdf::{GRAVITY, Limit, Mimic, Urdf};
 use crate::error::{Result, Warning, WarningKind};
@@ -23,7 +23,7 @@ use std::path::Path;
 use xml::{Element, Node};
 
 /// Whether a text is an MJCF, by its root element.
-pub(super) fn is(text: &str) -> bool {
+pub(crate) fn is(text: &str) -> bool {
     let mut rest = text.trim_start_matches('\u{feff}').trim_start();
     loop {
         let end = match rest {
@@ -45,6 +45,16 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
     let root = xml::parse(text, file)?;
     let compiler = Compiler::of(&root)?;
     let mut reader = Reader::new(&compiler);
+    of(&root, &compiler, &mut reader, file)
+}
+
+/// Links and joints of the elements of an MJCF; what stands where is left in the reader.
+pub(crate) fn of<'a>(
+    root: &'a Node,
+    compiler: &'a Compiler,
+    reader: &mut Reader<'a>,
+    file: &Path,
+) -> Result<Urdf> {
     for world in root.all("worldbody") {
         reader.world(world)?;
     }
@@ -54,9 +64,9 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
     let mut urdf = Urdf {
         name: root.own("model").unwrap_or_default().trim().to_string(),
         file: file.to_path_buf(),
-        links: reader.links,
-        joints: reader.joints,
-        warnings: reader.warnings,
+        links: std::mem::take(&mut reader.links),
+        joints: std::mem::take(&mut reader.joints),
+        warnings: std::mem::take(&mut reader.warnings),
         gravity: GRAVITY,
     };
     for node in root.all("option") {
@@ -80,10 +90,10 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
         }
     }
     for node in root.all("equality").flat_map(|e| &e.children) {
-        equality(&mut urdf, &compiler, node, &reader.refs)?;
+        equality(&mut urdf, compiler, node, &reader.refs)?;
     }
     for node in root.all("actuator").flat_map(|a| &a.children) {
-        actuator(&mut urdf, &compiler, node)?;
+        actuator(&mut urdf, compiler, node)?;
     }
     for node in root.all("tendon").flat_map(|t| &t.children) {
         let e = compiler.element(node, None)?;

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use nalgebra::Vector3;
 use roxmltree::Document;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Files that may include one another in a row.
@@ -20,6 +21,19 @@ pub struct Node {
     pub children: Vec<Node>,
     pub line: u32,
     pub file: PathBuf,
+    /// bytes of the element in its file
+    pub span: Range<usize>,
+    /// bytes of each attribute, and of its value
+    pub spans: HashMap<String, [Range<usize>; 2]>,
+}
+
+/// A file that was read, without its byte order mark.
+#[derive(Debug, Clone)]
+pub struct Source {
+    pub path: PathBuf,
+    pub text: String,
+    /// bytes of the name of each file that it includes, and that file as it is found
+    pub includes: Vec<(Range<usize>, PathBuf)>,
 }
 
 impl Node {
@@ -59,7 +73,7 @@ impl Node {
 }
 
 /// An element with the defaults of its class.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct Element<'a> {
     pub node: &'a Node,
     pub defaults: Option<&'a Attributes>,
@@ -105,60 +119,91 @@ impl<'a> Element<'a> {
 
 /// Parses a file, its includes in their place.
 pub fn parse(text: &str, file: &Path) -> Result<Node> {
-    let folder = file.parent().unwrap_or(Path::new("")).to_path_buf();
-    one(text, file, &folder, 0)
+    Ok(sources(text, file)?.0)
 }
 
-fn one(text: &str, file: &Path, folder: &Path, depth: usize) -> Result<Node> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let document = Document::parse(text).map_err(|e| {
-        let place = format!("line {}", e.pos().row);
-        let said = e.to_string();
-        let said = said.split(" at ").next().unwrap_or_default().to_string();
-        Error::file(
-            file,
-            place,
-            format!("malformed XML: {said}; correct the file"),
-        )
-    })?;
-    convert(document.root_element(), &document, file, folder, depth)
-}
-
-fn convert(
-    node: roxmltree::Node,
-    document: &Document,
-    file: &Path,
-    folder: &Path,
-    depth: usize,
-) -> Result<Node> {
-    let mut out = Node {
-        tag: node.tag_name().name().to_string(),
-        attributes: node
-            .attributes()
-            .map(|a| (a.name().to_string(), a.value().to_string()))
-            .collect(),
-        children: Vec::new(),
-        line: document.text_pos_at(node.range().start).row,
-        file: file.to_path_buf(),
+/// The same, with the texts of all files; the file itself is the last.
+pub fn sources(text: &str, file: &Path) -> Result<(Node, Vec<Source>)> {
+    let mut parser = Parser {
+        folder: file.parent().unwrap_or(Path::new("")).to_path_buf(),
+        sources: Vec::new(),
     };
-    for child in node.children().filter(roxmltree::Node::is_element) {
-        let child = convert(child, document, file, folder, depth)?;
-        if child.tag != "include" {
-            out.children.push(child);
-            continue;
-        }
-        let name = child
-            .own("file")
-            .ok_or_else(|| child.error("it names no `file`"))?;
-        if depth >= DEEPEST {
-            return Err(child.error("files include one another; remove one of the includes"));
-        }
-        // relative to the file that is loaded
-        let path = folder.join(name);
-        let text = crate::robot::file::text::read_text(&path)
-            .map_err(|e| child.error(format!("cannot read {}: {e}", path.display())))?;
-        let included = one(&text, &path, folder, depth + 1)?;
-        out.children.extend(included.children);
+    let root = parser.one(text, file, 0)?;
+    Ok((root, parser.sources))
+}
+
+struct Parser {
+    /// what the names of included files are relative to: the folder of the file that is loaded
+    folder: PathBuf,
+    sources: Vec<Source>,
+}
+
+impl Parser {
+    fn one(&mut self, text: &str, file: &Path, depth: usize) -> Result<Node> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let document = Document::parse(text).map_err(|e| {
+            let place = format!("line {}", e.pos().row);
+            let said = e.to_string();
+            let said = said.split(" at ").next().unwrap_or_default().to_string();
+            Error::file(
+                file,
+                place,
+                format!("malformed XML: {said}; correct the file"),
+            )
+        })?;
+        let mut includes = Vec::new();
+        let root = document.root_element();
+        let node = self.convert(root, &document, file, depth, &mut includes)?;
+        self.sources.push(Source {
+            path: file.to_path_buf(),
+            text: text.to_string(),
+            includes,
+        });
+        Ok(node)
     }
-    Ok(out)
+
+    fn convert(
+        &mut self,
+        node: roxmltree::Node,
+        document: &Document,
+        file: &Path,
+        depth: usize,
+        includes: &mut Vec<(Range<usize>, PathBuf)>,
+    ) -> Result<Node> {
+        let spans = |a: roxmltree::Attribute| (a.name().to_string(), [a.range(), a.range_value()]);
+        let mut out = Node {
+            tag: node.tag_name().name().to_string(),
+            attributes: node
+                .attributes()
+                .map(|a| (a.name().to_string(), a.value().to_string()))
+                .collect(),
+            children: Vec::new(),
+            line: document.text_pos_at(node.range().start).row,
+            file: file.to_path_buf(),
+            span: node.range(),
+            spans: node.attributes().map(spans).collect(),
+        };
+        for child in node.children().filter(roxmltree::Node::is_element) {
+            let child = self.convert(child, document, file, depth, includes)?;
+            if child.tag != "include" {
+                out.children.push(child);
+                continue;
+            }
+            let name = child
+                .own("file")
+                .ok_or_else(|| child.error("it names no `file`"))?;
+            if depth >= DEEPEST {
+                return Err(child.error("files include one another; remove one of the includes"));
+            }
+            let path = self.folder.join(name);
+            let text = crate::robot::file::text::read_text(&path)
+                .map_err(|e| child.error(format!("cannot read {}: {e}", path.display())))?;
+            if let Some([_, value]) = child.spans.get("file") {
+                includes.push((value.clone(), path.clone()));
+            }
+            let included = self.one(&text, &path, depth + 1)?;
+            out.children.extend(included.children);
+        }
+        Ok(out)
+    }
 }
