@@ -5,11 +5,12 @@ use crate::error::{argument, to_python};
 use crate::named::named;
 use crate::plant::Plant;
 use crate::report::Report;
-use excite::cli::design::{check_rate, diagnostic, periods};
+use excite::cli::design::{check_rate, diagnostic, periods, usual};
 use excite::cli::pretty;
-use excite::design::{Condition, Control, Progress, Settings, design_with};
+use excite::design::{Condition, Control, Progress, Question, Settings, design_with};
 use excite::identifiability::{assess as assessed, json::json, page};
 use excite::log::Purpose;
+use excite::simulate::effects::parse_payload;
 use excite::trajectory::{Grid, Trajectory};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
@@ -29,12 +30,14 @@ type Motions = Vec<(String, bool, String, String)>;
 /// early.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, clippy::type_complexity)]
-#[pyo3(signature = (plant, *, harmonics, period, periods_, grid, diagnostic, ends, start, criterion, condition, derate, rate, seed, starts, time_limit, threads, spec, progress))]
+#[pyo3(signature = (plant, *, purpose, payload, harmonics, period, periods_, grid, diagnostic, ends, start, criterion, condition, derate, rate, seed, starts, time_limit, threads, spec, progress))]
 pub fn design(
     py: Python<'_>,
     plant: &Plant,
-    harmonics: usize,
-    period: f64,
+    purpose: Option<String>,
+    payload: Option<String>,
+    harmonics: Option<usize>,
+    period: Option<f64>,
     periods_: Option<u32>,
     grid: String,
     diagnostic: bool,
@@ -53,18 +56,31 @@ pub fn design(
 ) -> PyResult<(Report, String, Motions, String, Option<Py<PyAny>>)> {
     let core = plant.core.clone();
     let condition = condition.map(|c| named("condition", &c)).transpose()?;
+    let question: Option<Question> = purpose.map(|p| named("purpose", &p)).transpose()?;
+    let usual = usual(question, payload.as_deref()).map_err(|e| to_python(&e))?;
     let settings = Settings {
-        harmonics,
-        period,
-        periods: periods(periods_, diagnostic).map_err(|e| to_python(&e))?,
+        harmonics: harmonics.unwrap_or(usual.harmonics),
+        period: period.unwrap_or(usual.period),
+        periods: match (question, periods_) {
+            (Some(_), None) => usual.periods,
+            _ => periods(periods_, diagnostic).map_err(|e| to_python(&e))?,
+        },
         grid: match diagnostic {
             true => Grid::Odd,
             false => named("grid", &grid)?,
         },
         ends: named("ends", &ends)?,
         start,
-        criterion: named("criterion", &criterion)?,
-        condition: condition.unwrap_or(Condition::usual(&core)),
+        criterion: match question {
+            Some(_) => usual.criterion,
+            None => named("criterion", &criterion)?,
+        },
+        condition: match question {
+            Some(_) => usual.condition,
+            None => condition.unwrap_or(Condition::usual(&core)),
+        },
+        question,
+        payload: usual.payload,
         derate,
         seed,
         starts,
@@ -74,6 +90,9 @@ pub fn design(
     let work = move |reporter: &crate::call::Reporter| {
         let begin = Instant::now();
         settings.check(core.moved())?;
+        if let Some(question) = settings.question {
+            question.check(&core)?;
+        }
         check_rate(rate, &settings)?;
         let tell = |p: Progress| {
             let (most, seconds) = settings.budget();
@@ -127,8 +146,17 @@ pub fn design(
 
 /// What a robot, and a trajectory on it, can identify.
 #[pyfunction]
-pub fn assess(py: Python<'_>, plant: &Plant, text: Option<String>) -> PyResult<Report> {
+pub fn assess(
+    py: Python<'_>,
+    plant: &Plant,
+    text: Option<String>,
+    payload: Option<String>,
+) -> PyResult<Report> {
     let core = plant.core.clone();
+    let payload = payload
+        .map(|p| parse_payload(&p))
+        .transpose()
+        .map_err(|e| to_python(&e))?;
     let motion = text.as_deref().map(trajectory).transpose()?;
     simply(py, move |_| {
         let begin = Instant::now();
@@ -141,7 +169,10 @@ pub fn assess(py: Python<'_>, plant: &Plant, text: Option<String>) -> PyResult<R
             plant = plant.in_space(t.space).map_err(about)?;
             t.matches(plant.moved()).map_err(about)?;
         }
-        let assessment = assessed(&plant, motion.as_ref())?;
+        let mut assessment = assessed(&plant, motion.as_ref())?;
+        if let (Some(load), Some(t)) = (&payload, &motion) {
+            assessment = assessment.with_load(&plant, t, load, true)?;
+        }
         let value = json(&assessment, None, begin.elapsed().as_secs_f64());
         Ok(Report {
             json: pretty(&value),
