@@ -87,8 +87,10 @@ def _real_or_none(name: str, value: Any) -> Optional[float]:
 def design(
     robot: RobotLike,
     *,
-    harmonics: int = 5,
-    period: float = 10.0,
+    purpose: Optional[str] = None,
+    payload: Any = None,
+    harmonics: Optional[int] = None,
+    period: Optional[float] = None,
     periods: Optional[int] = None,
     grid: str = "full",
     diagnostic: bool = False,
@@ -115,9 +117,13 @@ def design(
 
     Args:
         robot: an :class:`excite.Robot`, a path, or a bundled name.
-        harmonics: of the Fourier series of each joint.
-        period: s.
-        periods: of the experiment; 1, or 3 with ``diagnostic``.
+        purpose: what the motion is for (``--for``): ``"load"``, ``"platform"``, ``"legs"``, ``"friction"``; all base parameters
+            where left out. Sets criterion, unknowns, harmonics, period and periods.
+        payload: the load that ``purpose="load"`` is about: kg, centre of mass (m) and tensor about it (kg m²), 4 or 10
+            numbers; an ordinary one where left out.
+        harmonics: of the Fourier series of each joint; 5, or what serves the purpose.
+        period: s; 10, or what serves the purpose.
+        periods: of the experiment; 1, 3 with ``diagnostic``, or what gives a minute for the purpose.
         grid: harmonics used: ``"full"``, ``"odd"``, ``"random-odd"``.
         diagnostic: also make the motions that :func:`diagnose` wants, in ``motions``; all of odd harmonics.
         ends: ``"rest"`` (zero velocity and acceleration) or ``"free"``.
@@ -146,13 +152,17 @@ def design(
         own = own.without_collisions()
     elif meshes:
         own = own.with_meshes(meshes)
+    if purpose is not None and (diagnostic or criterion != "known" or condition is not None):
+        raise unusable("purpose chooses the criterion: diagnostic, criterion and condition cannot be stated with it")
     if diagnostic and grid != "full":
         raise unusable("diagnostic chooses odd harmonics: grid cannot be stated with it")
     with Bar(progress, "design") as bar:
         report, text, motions, experiment, signal = _excite.design(
             own._plant,
-            harmonics=_integer("harmonics", harmonics),
-            period=_real("period", period),
+            purpose=purpose,
+            payload=None if payload is None else _numbers("payload", payload),
+            harmonics=_optional("harmonics", harmonics),
+            period=_real_or_none("period", period),
             periods_=_optional("periods", periods),
             grid=grid,
             diagnostic=bool(diagnostic),
@@ -187,12 +197,14 @@ def assess(
     robot: RobotLike,
     trajectory: Optional[TrajectoryLike] = None,
     *,
+    payload: Any = None,
     identify: Optional[Sequence[str]] = None,
     collision: bool = True,
     meshes: Sequence[PathLike] = (),
 ) -> Assessment:
     """What a robot can tell, and with a trajectory how well, and whether all limits hold for all time
-    (``excite identifiability``). Arguments as for :func:`design`."""
+    (``excite identifiability``). Arguments as for :func:`design`; with ``payload`` also how well the trajectory tells
+    this load."""
     own = _robot(robot)
     if identify is not None:
         own = own.with_terms(_names("identify", identify))
@@ -201,7 +213,10 @@ def assess(
     elif meshes:
         own = own.with_meshes(meshes)
     text = None if trajectory is None else as_trajectory(trajectory).to_json()
-    result = Assessment(_excite.assess(own._plant, text))
+    load = None if payload is None else _numbers("payload", payload)
+    if load is not None and text is None:
+        raise unusable("a payload is told by a trajectory: state one")
+    result = Assessment(_excite.assess(own._plant, text, load))
     emit(result.warnings)
     return result
 

@@ -5,11 +5,12 @@ use crate::error::{argument, to_python};
 use crate::named::named;
 use crate::plant::Plant;
 use crate::report::Report;
-use excite::cli::design::{check_rate, diagnostic, periods};
+use excite::cli::design::{check_rate, diagnostic, periods, usual};
 use excite::cli::pretty;
-use excite::design::{Condition, Control, Progress, Settings, design_with};
+use excite::design::{Condition, Control, Progress, Question, design_with};
 use excite::identifiability::{assess as assessed, json::json, page};
 use excite::log::Purpose;
+use excite::simulate::effects::parse_payload;
 use excite::trajectory::{Grid, Trajectory};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
@@ -29,12 +30,14 @@ type Motions = Vec<(String, bool, String, String)>;
 /// early.
 #[pyfunction]
 #[allow(clippy::too_many_arguments, clippy::type_complexity)]
-#[pyo3(signature = (plant, *, harmonics, period, periods_, grid, diagnostic, ends, start, criterion, condition, derate, rate, seed, starts, time_limit, threads, spec, progress))]
+#[pyo3(signature = (plant, *, purpose, payload, harmonics, period, periods_, grid, diagnostic, ends, start, criterion, condition, derate, rate, seed, starts, time_limit, threads, spec, progress))]
 pub fn design(
     py: Python<'_>,
     plant: &Plant,
-    harmonics: usize,
-    period: f64,
+    purpose: Option<String>,
+    payload: Option<String>,
+    harmonics: Option<usize>,
+    period: Option<f64>,
     periods_: Option<u32>,
     grid: String,
     diagnostic: bool,
@@ -53,18 +56,25 @@ pub fn design(
 ) -> PyResult<(Report, String, Motions, String, Option<Py<PyAny>>)> {
     let core = plant.core.clone();
     let condition = condition.map(|c| named("condition", &c)).transpose()?;
-    let mut settings = Settings::default();
-    settings.harmonics = harmonics;
-    settings.period = period;
-    settings.periods = periods(periods_, diagnostic).map_err(|e| to_python(&e))?;
+    let question: Option<Question> = purpose.map(|p| named("purpose", &p)).transpose()?;
+    // of a question period, harmonics, criterion and condition are its own
+    let mut settings = usual(question, payload.as_deref()).map_err(|e| to_python(&e))?;
+    settings.harmonics = harmonics.unwrap_or(settings.harmonics);
+    settings.period = period.unwrap_or(settings.period);
+    if question.is_none() || periods_.is_some() {
+        settings.periods = periods(periods_, diagnostic).map_err(|e| to_python(&e))?;
+    }
     settings.grid = match diagnostic {
         true => Grid::Odd,
         false => named("grid", &grid)?,
     };
     settings.ends = named("ends", &ends)?;
     settings.start = start;
-    settings.criterion = named("criterion", &criterion)?;
-    settings.condition = condition.unwrap_or(Condition::usual(&core));
+    if question.is_none() {
+        settings.criterion = named("criterion", &criterion)?;
+        settings.condition = condition.unwrap_or(Condition::usual(&core));
+    }
+    settings.question = question;
     settings.derate = derate;
     settings.seed = seed;
     settings.starts = starts;
@@ -73,6 +83,9 @@ pub fn design(
     let work = move |reporter: &crate::call::Reporter| {
         let begin = Instant::now();
         settings.check(core.moved())?;
+        if let Some(question) = settings.question {
+            question.check(&core)?;
+        }
         check_rate(rate, &settings)?;
         let tell = |p: Progress| {
             let (most, seconds) = settings.budget();
@@ -127,8 +140,17 @@ pub fn design(
 
 /// What a robot, and a trajectory on it, can identify.
 #[pyfunction]
-pub fn assess(py: Python<'_>, plant: &Plant, text: Option<String>) -> PyResult<Report> {
+pub fn assess(
+    py: Python<'_>,
+    plant: &Plant,
+    text: Option<String>,
+    payload: Option<String>,
+) -> PyResult<Report> {
     let core = plant.core.clone();
+    let payload = payload
+        .map(|p| parse_payload(&p))
+        .transpose()
+        .map_err(|e| to_python(&e))?;
     let motion = text.as_deref().map(trajectory).transpose()?;
     simply(py, move |_| {
         let begin = Instant::now();
@@ -141,7 +163,10 @@ pub fn assess(py: Python<'_>, plant: &Plant, text: Option<String>) -> PyResult<R
             plant = plant.in_space(t.space).map_err(about)?;
             t.matches(plant.moved()).map_err(about)?;
         }
-        let assessment = assessed(&plant, motion.as_ref())?;
+        let mut assessment = assessed(&plant, motion.as_ref())?;
+        if let (Some(load), Some(t)) = (&payload, &motion) {
+            assessment = assessment.with_load(&plant, t, load, true)?;
+        }
         let value = json(&assessment, None, begin.elapsed().as_secs_f64());
         Ok(Report {
             json: pretty(&value),

@@ -4,10 +4,11 @@ pub mod diagnostic;
 
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::design::diagnostic::PERIODS;
-use excite::design::{Condition, Control, Criterion, Progress, Settings, design_with};
+use excite::design::{Condition, Control, Criterion, Progress, Question, Settings, design_with};
 use excite::identifiability::assess;
 use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;
+use excite::simulate::effects::parse_payload;
 use excite::trajectory::{Ends, Grid, Space, Trajectory};
 use excite::{Error, Plant, Result};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -38,13 +39,27 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
-    /// Harmonics of the Fourier series of each joint
-    #[arg(long, default_value_t = 5, allow_negative_numbers = true)]
-    harmonics: usize,
-    /// Period in seconds
-    #[arg(long, default_value_t = 10.0, allow_negative_numbers = true)]
-    period: f64,
-    /// Periods of the experiment [default: 1; 3 with --diagnostic, which wants at least so many]
+    /// What the motion is for: a load that the robot carries, the platform or the legs of a parallel robot, or friction;
+    /// sets criterion, unknowns, harmonics, period and periods [default: all base parameters]
+    #[arg(long = "for", value_name = "load|platform|legs|friction", value_parser = named::<Question>, conflicts_with_all = ["criterion", "condition", "diagnostic"])]
+    question: Option<Question>,
+    /// With --for load: the load that the accuracy is stated for and that the limits allow for: kg, centre of mass in m and
+    /// tensor about it in kg m², in the frame of the last body or platform [default: a cube of water as heavy as that
+    /// body, or a twentieth of all bodies where that is more]
+    #[arg(
+        long,
+        value_name = "MASS,X,Y,Z[,Ixx,Ixy,Ixz,Iyy,Iyz,Izz]",
+        allow_hyphen_values = true
+    )]
+    payload: Option<String>,
+    /// Harmonics of the Fourier series of each joint [default: 5; with --for what serves it]
+    #[arg(long, allow_negative_numbers = true)]
+    harmonics: Option<usize>,
+    /// Period in seconds [default: 10; with --for what serves it]
+    #[arg(long, allow_negative_numbers = true)]
+    period: Option<f64>,
+    /// Periods of the experiment [default: 1; 3 with --diagnostic, which wants at least so many; with --for what gives a
+    /// minute]
     #[arg(long, allow_negative_numbers = true)]
     periods: Option<u32>,
     /// Harmonics used: full (1, 2, 3, …), odd, or random-odd (odd with one in four left out)
@@ -117,18 +132,30 @@ pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let plant = load(&args.robot, args.identify.as_deref())?.in_space(args.coordinates)?;
     let plant = args.collisions.apply(plant);
+    let usual = usual(args.question, args.payload.as_deref())?;
     let settings = Settings {
-        harmonics: args.harmonics,
-        period: args.period,
-        periods: periods(args.periods, args.diagnostic)?,
+        harmonics: args.harmonics.unwrap_or(usual.harmonics),
+        period: args.period.unwrap_or(usual.period),
+        periods: match (args.question, args.periods) {
+            (Some(_), None) => usual.periods,
+            (_, asked) => periods(asked, args.diagnostic)?,
+        },
         grid: match args.diagnostic {
             true => Grid::Odd,
             false => args.grid,
         },
         ends: args.ends,
         start: args.start,
-        criterion: args.criterion,
-        condition: args.condition.unwrap_or(Condition::usual(&plant)),
+        criterion: match args.question {
+            Some(_) => usual.criterion,
+            None => args.criterion,
+        },
+        condition: match args.question {
+            Some(_) => usual.condition,
+            None => args.condition.unwrap_or(Condition::usual(&plant)),
+        },
+        question: args.question,
+        payload: usual.payload,
         derate: args.derate,
         seed: args.seed,
         starts: args.starts,
@@ -136,6 +163,9 @@ pub fn run(args: Args) -> Result<()> {
         threads: args.threads,
     };
     settings.check(plant.moved())?;
+    if let Some(question) = args.question {
+        question.check(&plant)?;
+    }
     check_rate(args.rate, &settings)?;
     let mut names = vec![
         "trajectory.json",
@@ -145,6 +175,9 @@ pub fn run(args: Args) -> Result<()> {
     ];
     if args.diagnostic {
         names.extend(diagnostic::FILES);
+    }
+    if args.question == Some(Question::Load) {
+        names.push("experiment.toml");
     }
     let files = prepare_dir(&args.output, &names, args.force)?;
 
@@ -185,6 +218,11 @@ pub fn run(args: Args) -> Result<()> {
         true => diagnostic::Set::new(&plant, &result.trajectory, &settings)?,
         false => diagnostic::Set::default(),
     };
+    if args.question == Some(Question::Load) {
+        let robot = diagnostic::robot_from(&args.output, &args.robot);
+        let text = experiment(plant.name(), &robot, result.trajectory.fourier.period);
+        write(&args.output.join("experiment.toml"), args.force, &text)?;
+    }
     set.write(&plant, &args.robot, &args.output, args.force, args.rate)?;
     let mut json = json(
         &assessment,
@@ -207,6 +245,45 @@ pub fn run(args: Args) -> Result<()> {
             print(&format!("{summary}{}", set.summary()))
         }
     }
+}
+
+/// Settings where nothing else is asked for: those that serve a question, with the load that it is about.
+///
+/// # Errors
+/// A load that cannot be, or one that no question is about.
+pub fn usual(question: Option<Question>, payload: Option<&str>) -> Result<Settings> {
+    let payload = payload.map(parse_payload).transpose()?;
+    match (question, payload) {
+        (None, None) => Ok(Settings::default()),
+        (Some(Question::Load), load) => Ok(Settings {
+            payload: load.map(|l| l.quantities()),
+            ..Question::Load.settings()
+        }),
+        (Some(question), None) => Ok(question.settings()),
+        (_, Some(_)) => Err(Error::Argument(
+            "--payload names the load of --for load; excite identifiability --payload judges any trajectory by it".into(),
+        )),
+    }
+}
+
+/// The experiment of a load that waits for its two logs.
+fn experiment(name: &str, robot: &str, period: f64) -> String {
+    let robot = toml::Value::String(robot.into());
+    let record = |log: &str, payload: &str| {
+        format!(
+            "\n[[record]]\nlog = \"{log}\"\nuse = \"fit\"\nperiod = {period:?}\npayload = \"{payload}\"\n"
+        )
+    };
+    format!(
+        "# Load of {name}, made by `excite design --for load`.\n\
+         # Run trajectory.json for all its periods twice, within the same hour: empty, then with the load. Save the\n\
+         # logs (t, q1.., and tau1.. or pressures pa1 pb1 ..) beside this file under the names below, then\n\
+         #   excite load experiment.toml\n\
+         # A third record with a weight of known mass, payload = {{ mass = 5.0 }}, tells the gains of the drives.\n\
+         robot = {robot}\n{}{}",
+        record("empty.csv", "none"),
+        record("loaded.csv", "unknown"),
+    )
 }
 
 /// Refuses a rate of samples that cannot be.

@@ -3,6 +3,7 @@
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::identifiability::{assess, json::json, page};
 use excite::output::prepare_dir;
+use excite::simulate::effects::parse_payload;
 use excite::trajectory::Trajectory;
 use excite::{Error, Result};
 use std::path::PathBuf;
@@ -34,6 +35,15 @@ pub struct Args {
     /// offset, or none [default: as in the robot file]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
+    /// Also say how well the trajectory tells this load: kg, centre of mass in m and tensor about it in kg m², in the frame of
+    /// the last body or platform
+    #[arg(
+        long,
+        value_name = "MASS,X,Y,Z[,Ixx,Ixy,Ixz,Iyy,Iyz,Izz]",
+        allow_hyphen_values = true,
+        requires = "trajectory"
+    )]
+    payload: Option<String>,
     #[command(flatten)]
     collisions: super::Collisions,
     /// Print report.json to standard output instead of a summary
@@ -43,6 +53,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
+    let payload = args.payload.as_deref().map(parse_payload).transpose()?;
     let mut plant = args
         .collisions
         .apply(load(&args.robot, args.identify.as_deref())?);
@@ -55,7 +66,10 @@ pub fn run(args: Args) -> Result<()> {
             .map_err(|e| Error::file(path, "", e.to_string()))?;
     }
     let files = prepare_dir(&args.output, &["report.json", "report.html"], args.force)?;
-    let assessment = assess(&plant, trajectory.as_ref())?;
+    let mut assessment = assess(&plant, trajectory.as_ref())?;
+    if let (Some(load), Some(t)) = (&payload, &trajectory) {
+        assessment = assessment.with_load(&plant, t, load, true)?;
+    }
     warn(&assessment.warnings);
     let json = json(&assessment, None, begin.elapsed().as_secs_f64());
     write(&files[0], args.force, &pretty(&json))?;

@@ -2,7 +2,7 @@
 
 use excite::base::Identifiability;
 use excite::design::{Record, Status};
-use excite::identifiability::{Assessment, Excitation};
+use excite::identifiability::{Assessment, Excitation, LoadAccuracy};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -24,7 +24,10 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
         base.count(),
     );
     if let Some(e) = &assessment.excitation {
-        out.push_str(&excitation(e, &assessment.torque_noise));
+        out.push_str(&excitation(assessment, e));
+    }
+    if let Some(l) = &assessment.load {
+        out.push_str(&load(l));
     }
     if let Some(r) = record {
         let how = match r.status {
@@ -45,13 +48,58 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
     out
 }
 
-fn excitation(e: &Excitation, torque_noise: &[f64]) -> String {
+/// How well it tells a load.
+fn load(l: &LoadAccuracy) -> String {
     let mut out = String::new();
-    let c = &e.condition;
+    let [mass, com, tensor] = l.in_short(&l.shared);
+    let of = |x: Option<f64>, factor: f64, unit: &str| match x {
+        Some(x) => format!("{:.2} {unit}", 1.96 * factor * x),
+        None => "not determined".into(),
+    };
+    let relative = |m: f64| m / l.payload[0];
     let _ = writeln!(
         out,
-        "condition number {:.3} (raw {:.3}, normalised {:.3}, weighted {:.3})",
-        c.invariant, c.raw, c.normalised, c.weighted
+        "load of {:.4} kg{}, {:.0} s empty and {:.0} s loaded, 95 %:\n  mass {}, centre of mass {}, tensor {}",
+        l.payload[0],
+        if l.named { "" } else { " (none was named)" },
+        l.seconds,
+        l.seconds,
+        of(mass.map(relative), 100.0, "%"),
+        of(com, 1e3, "mm"),
+        of(tensor, 100.0, "%"),
+    );
+    let [mass, com, tensor] = l.in_short(&l.free);
+    let _ = writeln!(
+        out,
+        "  {}, {}, {} where constants of the drives move in between",
+        of(mass.map(relative), 100.0, "%"),
+        of(com, 1e3, "mm"),
+        of(tensor, 100.0, "%"),
+    );
+    if let Some(why) = &l.broken {
+        let _ = writeln!(out, "  WITH THE LOAD, do not run this: {why}");
+    }
+    out
+}
+
+fn excitation(a: &Assessment, e: &Excitation) -> String {
+    let mut out = String::new();
+    let torque_noise = &a.torque_noise;
+    let c = &e.condition;
+    let (name, headline) = a.condition().unwrap_or(("invariant", c.invariant));
+    let all = [
+        ("invariant", c.invariant),
+        ("raw", c.raw),
+        ("normalised", c.normalised),
+        ("weighted", c.weighted),
+    ];
+    let others = all.iter().filter(|(n, _)| *n != name);
+    let others: Vec<String> = others.map(|(n, v)| format!("{n} {v:.3}")).collect();
+    let what = if a.mechanism { " of unit columns" } else { "" };
+    let _ = writeln!(
+        out,
+        "condition number{what} {headline:.3} ({})",
+        others.join(", ")
     );
     let verdict = match e.certificate.satisfied {
         true => "all hold for all time",

@@ -28,6 +28,7 @@
 //! `s` in the subproblem. Likewise for the largest.
 
 use super::information::{Evaluation, Information};
+pub use super::targets::Targets;
 use crate::error::{Error, Result};
 use crate::plant::Plant;
 use faer::linalg::solvers::Solve;
@@ -48,47 +49,6 @@ pub enum Criterion {
     E,
     /// base parameters known to [`TARGET`] of their nominal value, by prior and motion together
     Known,
-}
-
-/// A base parameter counts as known from this standard deviation, relative to its nominal value.
-pub const TARGET: f64 = 0.1;
-/// Standard deviation of the nominal values before the run, relative to them: a parameter that the motion cannot
-/// tell keeps it, and does not count as a loss that could be mended.
-const PRIOR: f64 = 1.0;
-/// A nominal value below this share of the largest of its unit is judged as if it were that large.
-const SMALLEST: f64 = 1e-3;
-
-/// What [`Criterion::Known`] compares with: of each base parameter the standard deviation `a_i = TARGET |φ_i|` that is
-/// good enough, and of how many samples the optimiser's stand for the experiment's.
-///
-/// With `C = (κ Λ + diag(PRIOR φ_i)⁻²)⁻¹` the covariance after an experiment of `κ` times the samples of `Λ`,
-/// `ρ_i² = C_ii / a_i²`. The criterion counts softly, `Σ ρ_i⁴/(1 + ρ_i⁴)`: it gains nothing where a parameter is known
-/// (`ρ_i ≪ 1`) or out of reach, and most where the motion decides. So flat a function leads nowhere from afar: the
-/// first phase of a start minimises `½ Σ ln(1 + ρ_i²) / r` instead.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Targets {
-    /// `a_i √κ`
-    scale: Vec<f64>,
-}
-
-impl Targets {
-    /// From the nominal values of the base parameters, their units, and `κ`, the samples of the experiment for
-    /// each of the optimiser's.
-    pub fn new(nominal: &[f64], units: &[&str], kappa: f64) -> Self {
-        let largest = |unit: &str| {
-            let same = nominal.iter().zip(units).filter(|(_, u)| **u == unit);
-            same.fold(0.0_f64, |m, (v, _)| m.max(v.abs()))
-        };
-        let scale = nominal.iter().zip(units).map(|(value, unit)| {
-            let size = value.abs().max(SMALLEST * largest(unit));
-            // all of a unit can be 0: such a parameter is not judged by its value
-            let size = if size > 0.0 { size } else { 1.0 };
-            TARGET * size * kappa.sqrt()
-        });
-        Targets {
-            scale: scale.collect(),
-        }
-    }
 }
 
 /// Which matrix the eigenvalues are taken of.
@@ -116,15 +76,6 @@ impl Condition {
             true => Condition::Normalised,
         }
     }
-}
-
-/// Exponents of the smoothing from which [`Criterion::Known`] counts.
-const COUNTED: f64 = 20.0;
-
-/// `Σ ρ⁴/(1 + ρ⁴)` of the `ρ²`.
-fn missed(variances: &[f64]) -> f64 {
-    let each = variances.iter().map(|v| v * v / (1.0 + v * v));
-    each.sum::<f64>().max(1e-300)
 }
 
 /// Group of extreme eigenvalues: `A_0 + Σ_k δ_k A_k`, in units of the extreme one.
@@ -168,7 +119,7 @@ pub struct Objective {
     pub criterion: Criterion,
     /// of which matrix
     pub condition: Condition,
-    /// what [`Criterion::Known`] compares with
+    /// accuracies that are asked for, where the criterion is about these
     pub targets: Option<Targets>,
 }
 
@@ -195,9 +146,9 @@ impl Objective {
                 (false, None) => 1.0,
             })
             .collect();
-        let prior = known.map_or(0.0, |_| (TARGET / PRIOR).powi(2));
+        let prior = |i: usize| known.map_or(0.0, |t| t.prior[i]);
         let m = Mat::from_fn(r, r, |i, j| {
-            gram[(i, j)] * scale[i] * scale[j] + if i == j { prior } else { 0.0 }
+            gram[(i, j)] * scale[i] * scale[j] + if i == j { prior(i) } else { 0.0 }
         });
         let failed = || {
             Error::Infeasible("the eigenvalues of the information matrix did not converge".into())
@@ -226,12 +177,16 @@ impl Objective {
         if low.is_nan() || low <= 0.0 || low < 1e-15 * high {
             return f64::INFINITY;
         }
+        if let Some(targets) = &self.targets {
+            return targets.value(&spectrum.variances());
+        }
         match self.criterion {
             Criterion::Condition => 0.5 * (high / low).ln(),
             Criterion::D => -0.5 * l.iter().map(|x| x.ln()).sum::<f64>() / r,
             Criterion::A => 0.5 * (l.iter().map(|x| 1.0 / x).sum::<f64>() / r).ln(),
             Criterion::E => -0.5 * low.ln(),
-            Criterion::Known => missed(&spectrum.variances()).ln(),
+            // never without accuracies that are asked for
+            Criterion::Known => f64::INFINITY,
         }
     }
 
@@ -244,15 +199,14 @@ impl Objective {
         if !self.value(s).is_finite() {
             return f64::INFINITY;
         }
+        if let Some(targets) = &self.targets {
+            return targets.smooth_value(&s.variances(), p);
+        }
         let upper = || high.ln() + l.iter().map(|x| (x / high).powf(p)).sum::<f64>().ln() / p;
         let lower = || low.ln() - l.iter().map(|x| (low / x).powf(p)).sum::<f64>().ln() / p;
         match self.criterion {
             Criterion::Condition => 0.5 * (upper() - lower()),
             Criterion::E => -0.5 * lower(),
-            Criterion::Known if p < COUNTED => {
-                let all = s.variances();
-                0.5 * all.iter().map(|v| v.ln_1p()).sum::<f64>() / l.len() as f64
-            }
             _ => self.value(s),
         }
     }
@@ -267,8 +221,8 @@ impl Objective {
     ) -> Vec<f64> {
         let l = &s.values;
         let r = l.len();
-        if self.criterion == Criterion::Known {
-            return s.known_gradient(info, e, p);
+        if let Some(targets) = &self.targets {
+            return s.target_gradient(info, e, targets, p);
         }
         let (low, high) = (l[0], l[r - 1]);
         let up: Vec<f64> = l.iter().map(|x| (x / high).powf(p)).collect();
@@ -415,24 +369,28 @@ impl Spectrum {
         (0..inverse.nrows()).map(|i| inverse[(i, i)]).collect()
     }
 
-    /// Gradient of [`Criterion::Known`]: `∂ρ_i² = −u_iᵀ ∂Λ u_i` with `u_i` column `i` of the inverse, scaled.
-    fn known_gradient(&self, info: &Information, e: &mut Evaluation, p: f64) -> Vec<f64> {
+    /// Gradient of what [`Targets`] make of the variances: `∂ρ_i² = −u_iᵀ ∂Λ u_i` with `u_i` column `i` of the inverse,
+    /// scaled.
+    fn target_gradient(
+        &self,
+        info: &Information,
+        e: &mut Evaluation,
+        targets: &Targets,
+        p: f64,
+    ) -> Vec<f64> {
         let Some(inverse) = &self.inverse else {
             return vec![0.0; info.len()];
         };
-        let r = inverse.nrows();
-        let variances = self.variances();
-        let missed = missed(&variances);
-        let share = |v: f64| match p < COUNTED {
-            true => -0.5 / (r as f64 * (1.0 + v)),
-            false => -2.0 * v / ((1.0 + v * v).powi(2) * missed),
-        };
-        let columns = Mat::from_fn(r, r, |row, i| inverse[(row, i)] * self.scale[row]);
+        let slopes = targets.slopes(&self.variances(), p);
+        let judged: Vec<usize> = (0..slopes.len()).filter(|&i| slopes[i] != 0.0).collect();
+        let columns = Mat::from_fn(inverse.nrows(), judged.len(), |row, i| {
+            inverse[(row, judged[i])] * self.scale[row]
+        });
         let g = info.quadratic_gradients(e, columns.as_ref());
         (0..info.len())
             .map(|x| {
-                let all = variances.iter().enumerate();
-                all.map(|(i, v)| share(*v) * g[(x, i)]).sum()
+                let all = judged.iter().enumerate();
+                all.map(|(i, &k)| -slopes[k] * g[(x, i)]).sum()
             })
             .collect()
     }

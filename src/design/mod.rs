@@ -26,6 +26,8 @@ mod mechanism_limits;
 pub(crate) mod path;
 mod problem;
 #[doc(hidden)]
+pub mod question;
+#[doc(hidden)]
 pub mod record;
 mod restore;
 mod result;
@@ -33,11 +35,13 @@ mod rounds;
 pub(crate) mod settings;
 pub(crate) mod solve;
 pub(crate) mod start;
+mod targets;
 mod tool;
 pub(crate) mod torque;
 mod torque_rate;
 
 pub use criterion::{Condition, Criterion};
+pub use question::Question;
 pub use record::{Record, Status};
 pub use result::{Control, Design, Progress};
 pub use settings::Settings;
@@ -55,6 +59,7 @@ use limits::Limits;
 use mechanism_limits::MechanismLimits;
 use path::{All, PathLimits};
 use problem::{Problem, first_certified};
+use question::Asked;
 use std::sync::Arc;
 use std::time::Instant;
 use tool::ToolLimits;
@@ -106,31 +111,23 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
     let begin = Instant::now();
     let plant = &plant.clone().with_assumed_limits();
     let moved = plant.moved();
-    let base = plant.base()?;
-    something_to_identify(plant.name(), &base)?;
     let basis = basis(moved, settings)?;
-    let count = samples(plant.robot(), &basis.harmonics);
-    let noise = plant.torque_noise().0;
-    let counted = settings.criterion == Criterion::Known;
-    let weights =
-        (counted || settings.condition == Condition::Weighted).then_some(noise.as_slice());
-    let transform = transform(&base, settings);
+    let count = |plant: &Plant| samples(plant.robot(), &basis.harmonics);
+    let asked = match settings.question {
+        Some(question) => question::asked(question, plant, settings, count)?,
+        None => everything(plant, settings, count(plant))?,
+    };
+    let (searched, count) = (&asked.plant, count(&asked.plant));
+    let noise = searched.torque_noise().0;
+    let weights = (asked.targets.is_some() || settings.condition == Condition::Weighted)
+        .then_some(noise.as_slice());
     let (period, derate) = (settings.period, settings.derate);
-    let targets = counted.then(|| {
-        let units: Vec<&str> = base.kept.iter().map(|&k| base.units[k]).collect();
-        let recorded = f64::from(settings.periods) * period * RATE;
-        Targets::new(
-            &base.project(&plant.values()),
-            &units,
-            recorded / count as f64,
-        )
-    });
-    let info = Information::new(plant, &basis, period, count, transform, weights);
+    let info = Information::new(searched, &basis, period, count, asked.transform, weights);
     let scene = plant.scene()?;
     first_certified(|tighter| {
         let share = derate * tighter;
-        let path: Option<Box<dyn PathLimits + '_>> = match plant.mechanism() {
-            None => along_tree(plant, share, tighter, &basis, period, scene.clone()),
+        let path: Option<Box<dyn PathLimits + '_>> = match searched.mechanism() {
+            None => along_tree(searched, share, tighter, &basis, period, scene.clone()),
             Some(m) => Some(Box::new(MechanismLimits::new(m, share, period, count))),
         };
         let mut limits = Limits::new(moved, &basis, period, derate);
@@ -138,15 +135,40 @@ pub fn design_with(plant: &Plant, settings: &Settings, control: &Control) -> Res
             limits = limits.resting(home);
         }
         Problem {
-            plant,
+            plant: searched,
+            empty: (settings.question == Some(Question::Load)).then_some(plant),
             settings,
             basis: &basis,
             info: &info,
             limits,
             path: path.as_deref(),
-            targets: targets.clone(),
+            targets: asked.targets.clone(),
         }
         .solve(begin, control)
+    })
+    .map(|found| Design {
+        plant: match settings.question {
+            Some(Question::Friction) => question::with_friction(plant),
+            _ => plant.clone(),
+        },
+        ..found
+    })
+}
+
+/// What all base parameters are judged by.
+fn everything(plant: &Plant, settings: &Settings, count: usize) -> Result<Asked> {
+    let base = plant.base()?;
+    something_to_identify(plant.name(), &base)?;
+    let targets = (settings.criterion == Criterion::Known).then(|| {
+        let units: Vec<&str> = base.kept.iter().map(|&k| base.units[k]).collect();
+        let recorded = f64::from(settings.periods) * settings.period * RATE;
+        let nominal = base.project(&plant.values());
+        Targets::new(&nominal, &units, recorded / count as f64)
+    });
+    Ok(Asked {
+        transform: transform(&base, settings),
+        targets,
+        plant: plant.clone(),
     })
 }
 

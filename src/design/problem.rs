@@ -44,6 +44,8 @@ const SHRINKS: usize = 100;
 /// One problem.
 pub(super) struct Problem<'a> {
     pub plant: &'a Plant,
+    /// the same robot without the load that it carries, where it also runs so
+    pub empty: Option<&'a Plant>,
     pub settings: &'a Settings,
     pub basis: &'a Basis,
     pub info: &'a Information<'a>,
@@ -180,7 +182,13 @@ impl Problem<'_> {
         if let Some(broken) = self.plant.certify_limits(fourier, derate)?.broken() {
             return Ok(Some(broken));
         }
-        Ok(self.plant.certify(fourier, derate)?.broken())
+        if let Some(broken) = self.plant.certify(fourier, derate)?.broken() {
+            return Ok(Some(broken));
+        }
+        match self.empty {
+            Some(plant) => Ok(plant.certify(fourier, derate)?.broken()),
+            None => Ok(None),
+        }
     }
 
     /// Why there is no feasible trajectory.

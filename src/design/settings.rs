@@ -1,8 +1,11 @@
 //! Settings of a design: one struct for library, command line and report.
 
 use super::criterion::{Condition, Criterion};
+use super::question::{Question, ordinary_load};
 use crate::error::{Error, Result};
-use crate::robot::Robot;
+use crate::plant::Plant;
+use crate::robot::inertia::Quantities;
+use crate::robot::{Inertia, Robot};
 use crate::trajectory::{Ends, Grid};
 
 /// Settings of a design. Every field has a default that suits most arms.
@@ -27,6 +30,12 @@ pub struct Settings {
     pub criterion: Criterion,
     /// of which matrix
     pub condition: Condition,
+    /// what the motion is for; `None`: all base parameters
+    #[serde(rename = "for", skip_serializing_if = "Option::is_none")]
+    pub question: Option<Question>,
+    /// the load that it is for: mass, centre of mass, tensor about it (xx, xy, xz, yy, yz, zz); `None`: an ordinary one
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub payload: Option<Quantities>,
     /// fraction of every limit that may be used
     pub derate: f64,
     /// seed of the random starts
@@ -55,6 +64,8 @@ impl Default for Settings {
             start: None,
             criterion: Criterion::Condition,
             condition: Condition::Invariant,
+            question: None,
+            payload: None,
             derate: 1.0,
             seed: 1,
             starts: None,
@@ -72,6 +83,14 @@ impl Settings {
             (Some(starts), None) => (starts, f64::INFINITY),
             (None, Some(seconds)) => (usize::MAX, seconds),
             (Some(starts), Some(seconds)) => (starts, seconds),
+        }
+    }
+
+    /// The load that the motion is for.
+    pub fn load(&self, plant: &Plant) -> Inertia {
+        match &self.payload {
+            Some(q) => Inertia::from_quantities(q),
+            None => ordinary_load(plant),
         }
     }
 
@@ -121,6 +140,14 @@ impl Settings {
             return bad(format!(
                 "threads must be at most 1024, not {}",
                 self.threads
+            ));
+        }
+        if let Some(q) = &self.payload
+            && !(q.iter().all(|v| v.is_finite()) && q[0] > 0.0)
+        {
+            return bad(format!(
+                "the payload must have a mass above 0, not {} kg",
+                q[0]
             ));
         }
         if let Some(start) = &self.start {

@@ -3,7 +3,7 @@
 use super::page::reproduce::seed;
 use super::page::verdict::{verdict, violations};
 use crate::design::record::Record;
-use crate::identifiability::{Assessment, Excitation, Platform};
+use crate::identifiability::{Assessment, Excitation, GAIN, LoadAccuracy, Platform, Spread};
 use crate::trajectory::certificate::{JointCertificate, Peak};
 use crate::trajectory::{Proof, SampledBound, Space};
 use serde_json::{Map, Value, json};
@@ -56,6 +56,7 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
         "condition_number",
         e.map_or(Value::Null, |e| {
             json!({
+                "headline": a.condition().map(|c| c.0),
                 "invariant": number(e.condition.invariant),
                 "raw": number(e.condition.raw),
                 "normalised": number(e.condition.normalised),
@@ -108,6 +109,7 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
         e.and_then(|e| e.platform.as_ref())
             .map_or(Value::Null, platform),
     );
+    put("load", a.load.as_ref().map_or(Value::Null, load));
     put("version", json!(env!("CARGO_PKG_VERSION")));
     put("robot_hash", json!(a.robot.hash));
     put(
@@ -284,6 +286,28 @@ fn peak(p: &Peak) -> Value {
         "used": optional(p.used),
         "margin": optional(p.margin),
         "satisfied": p.satisfied(),
+    })
+}
+
+/// How well the motion tells a load.
+fn load(l: &LoadAccuracy) -> Value {
+    let of = |s: &[Option<f64>]| -> Value { s.iter().copied().map(optional).collect() };
+    let spread = |s: &Spread| json!({ "mass": optional(s[0]), "com": of(&s[1..4]), "inertia_com": of(&s[4..]) });
+    json!({
+        "payload": {
+            "mass": number(l.payload[0]),
+            "com": numbers(&l.payload[1..4]),
+            "inertia_com": numbers(&l.payload[4..]),
+            "named": l.named,
+        },
+        "frame": l.body,
+        "seconds": number(l.seconds),
+        "std": spread(&l.shared),
+        "std_free_constants": spread(&l.free),
+        "std_of_gains_off_by": number(GAIN),
+        "std_gains": spread(&l.gains),
+        "limits_satisfied": l.broken.is_none(),
+        "limit_broken": l.broken,
     })
 }
 

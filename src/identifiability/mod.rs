@@ -15,20 +15,23 @@ mod clearance;
 mod elsewhere;
 #[doc(hidden)]
 pub mod json;
+mod load;
 #[doc(hidden)]
 pub mod page;
 mod platform;
 
 pub use clearance::{Clearances, LinkVolumes};
 pub use elsewhere::TorqueUncertainty;
+pub use load::{GAIN, LoadAccuracy, Spread};
 pub use platform::Platform;
 
 use crate::base::BaseParameters;
+use crate::design::{Question, Settings};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::report::view::View;
-use crate::robot::Robot;
+use crate::robot::{Inertia, Robot};
 use crate::trajectory::{Certificate, Proof, Trajectory, sample_period};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
@@ -125,8 +128,37 @@ pub struct Assessment {
     pub torque_noise: Vec<f64>,
     /// the trajectory, where one was given
     pub excitation: Option<Excitation>,
+    /// how well it tells a load, where it is meant for one or was asked
+    pub load: Option<LoadAccuracy>,
     /// everything imperfect: the robot's own, the rank's, the trajectory's
     pub warnings: Vec<Warning>,
+}
+
+impl Assessment {
+    /// The same with how well a trajectory of this plant tells a load.
+    ///
+    /// # Errors
+    /// As [`LoadAccuracy::of`].
+    pub fn with_load(
+        self,
+        plant: &Plant,
+        trajectory: &Trajectory,
+        load: &Inertia,
+        named: bool,
+    ) -> Result<Self> {
+        let load = Some(LoadAccuracy::of(plant, trajectory, load, named)?);
+        Ok(Assessment { load, ..self })
+    }
+
+    /// The condition number that stands for all, where a single one is printed: of the columns as they are for a tree; of
+    /// unit columns for a closed chain, whose parameters differ by orders of magnitude in size. With its name.
+    pub fn condition(&self) -> Option<(&'static str, f64)> {
+        let c = &self.excitation.as_ref()?.condition;
+        Some(match self.mechanism {
+            true => ("normalised", c.normalised),
+            false => ("invariant", c.invariant),
+        })
+    }
 }
 
 /// What a robot can tell at all, or on this trajectory.
@@ -212,7 +244,11 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         motion: actuators,
         view: Some(view),
     });
-    Ok(all)
+    let meant: Option<Settings> = serde_json::from_value(trajectory.settings.clone()).ok();
+    match meant.filter(|s| s.question == Some(Question::Load)) {
+        Some(s) => all.with_load(plant, trajectory, &s.load(plant), s.payload.is_some()),
+        None => Ok(all),
+    }
 }
 
 /// Without a trajectory.
@@ -228,6 +264,7 @@ fn alone(plant: &Plant) -> Result<Assessment> {
         base,
         torque_noise,
         excitation: None,
+        load: None,
     })
 }
 

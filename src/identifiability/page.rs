@@ -3,6 +3,7 @@
 //! The same report stands for a robot alone; what needs a trajectory is then left out.
 
 mod clearance;
+mod load;
 mod motion;
 mod parameters;
 mod platform;
@@ -64,6 +65,7 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
         sections.push(motion::usage(robot, e));
         sections.push(clearance::section(e));
     }
+    sections.extend(assessment.load.as_ref().map(load::section));
     sections.push(parameters::uncertainty(assessment));
     sections.push(spectrum::section(assessment));
     sections.extend(record.map(spectrum::history));
@@ -148,19 +150,14 @@ fn tiles(a: &Assessment) -> Markup {
     let (known, judged) = e.known(KNOWN);
     tiles.extend([
         worst,
-        match e.platform {
-            // parameters of a parallel robot differ by orders of magnitude in size
-            Some(_) => (
-                significant(e.condition.normalised, 3),
-                "condition number".to_string(),
-                "columns scaled to unit length".to_string(),
-            ),
-            None => (
-                significant(e.condition.invariant, 3),
-                "condition number".to_string(),
-                "independent of the choice of base parameters".to_string(),
-            ),
-        },
+        (
+            significant(a.condition().map_or(f64::INFINITY, |c| c.1), 3),
+            "condition number".to_string(),
+            match a.mechanism {
+                true => "columns scaled to unit length".to_string(),
+                false => "independent of the choice of base parameters".to_string(),
+            },
+        ),
         (
             format!("{known} of {judged}"),
             format!("known to {KNOWN}\u{a0}% or better"),

@@ -4,8 +4,9 @@
 use crate::conic::{Problem, Settings};
 use crate::error::Result;
 use crate::robot::Inertia;
+use crate::robot::inertia::Quantities;
 use faer::Mat;
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::SymmetricEigen;
 
 /// A load with its uncertainty.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -21,27 +22,6 @@ pub struct LoadBody {
     pub consistent: bool,
     /// whether it was moved to the nearest body that can exist
     pub projected: bool,
-}
-
-/// Mass, centre of mass and tensor about it: the quantities of `load.json`, xx, xy, xz, yy, yz, zz.
-pub type Quantities = [f64; 10];
-
-/// Mass, centre of mass, tensor about the centre of mass from the ten parameters.
-pub fn quantities(inertia: &Inertia) -> Quantities {
-    let c = inertia.com().unwrap_or_else(Vector3::zeros);
-    let i = inertia.tensor_com();
-    [
-        inertia.mass(),
-        c.x,
-        c.y,
-        c.z,
-        i.m11,
-        i.m12,
-        i.m13,
-        i.m22,
-        i.m23,
-        i.m33,
-    ]
 }
 
 impl LoadBody {
@@ -78,31 +58,17 @@ impl LoadBody {
 
     /// Mass, centre of mass and tensor.
     pub fn values(&self) -> Quantities {
-        quantities(&self.inertia)
+        self.inertia.quantities()
     }
 
     /// Their standard deviations, to first order.
     pub fn stds(&self) -> Quantities {
-        let base = self.inertia.0;
-        let scale = base.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-12);
-        // gradient by central differences: the map is a low-order rational function
-        let columns: Vec<Quantities> = (0..10)
-            .map(|k| {
-                let h = 1e-6 * scale;
-                let at = |s: f64| {
-                    let mut p = base;
-                    p[k] += s * h;
-                    quantities(&Inertia(p))
-                };
-                let (up, down) = (at(1.0), at(-1.0));
-                std::array::from_fn(|i| (up[i] - down[i]) / (2.0 * h))
-            })
-            .collect();
+        let slopes = self.inertia.quantity_slopes();
         std::array::from_fn(|i| {
             let mut variance = 0.0;
             for a in 0..10 {
                 for b in 0..10 {
-                    variance += columns[a][i] * self.covariance[(a, b)] * columns[b][i];
+                    variance += slopes[i][a] * self.covariance[(a, b)] * slopes[i][b];
                 }
             }
             variance.max(0.0).sqrt()
@@ -159,10 +125,4 @@ fn nearest(inertia: &Inertia, covariance: &Mat<f64>) -> Result<Inertia> {
 /// A load from total and platform, both about the same point: parameters add.
 pub fn difference(total: &Inertia, platform: &Inertia) -> Inertia {
     Inertia(std::array::from_fn(|k| total.0[k] - platform.0[k]))
-}
-
-/// Ten parameters from mass, centre of mass and the six entries of the tensor about it.
-pub fn from_quantities(v: &Quantities) -> Inertia {
-    let tensor = Matrix3::new(v[4], v[5], v[6], v[5], v[7], v[8], v[6], v[8], v[9]);
-    Inertia::from_com(v[0], Vector3::new(v[1], v[2], v[3]), tensor)
 }

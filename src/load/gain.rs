@@ -12,13 +12,13 @@
 //! that the small difference that the load makes is not attenuated, which least squares in
 //! `τ_j / k_j` would do.
 
-use super::body::from_quantities;
 use super::records::Loaded;
 use super::system::{Part, System};
 use super::weight::inflation;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Payload;
 use crate::plant::Plant;
+use crate::robot::Inertia;
 use faer::linalg::solvers::{DenseSolveCore, SolveLstsq};
 use faer::{Mat, Side};
 use rayon::prelude::*;
@@ -163,7 +163,7 @@ fn known_torque(part: &Part, loaded: &Loaded) -> Vec<f64> {
     values[0] = mass;
     values[1..4].copy_from_slice(&com.unwrap_or_default());
     values[4..].copy_from_slice(&inertia.unwrap_or_default());
-    let phi = from_quantities(&values).0;
+    let phi = Inertia::from_quantities(&values).0;
     (0..part.y.len())
         .map(|i| (0..10).map(|k| part.tool[(i, k)] * phi[k]).sum())
         .collect()

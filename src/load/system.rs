@@ -13,7 +13,7 @@ use crate::signals::Decimator;
 use faer::Mat;
 
 /// Friction columns of an actuator in one record: Coulomb, viscous, offset.
-pub const FRICTION: [JointTerm; 3] = [JointTerm::Coulomb, JointTerm::Viscous, JointTerm::Offset];
+pub const FRICTION: [JointTerm; 3] = JointTerm::FRICTION;
 
 /// One record as rows of the system; all lists actuator-major over the filtered samples.
 #[derive(Debug)]

@@ -25,7 +25,7 @@
 mod draws;
 
 use self::draws::Chain;
-use super::body::{LoadBody, Quantities, difference, from_quantities};
+use super::body::{LoadBody, difference};
 use super::one_step::{Solver, rms};
 use super::records::Loaded;
 use super::settings::Settings;
@@ -37,6 +37,7 @@ use crate::mechanism::task::rates_to_omega;
 use crate::mechanism::{Mechanism, Task};
 use crate::plant::Plant;
 use crate::robot::Inertia;
+use crate::robot::inertia::Quantities;
 use crate::robot::inertia::skew;
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
@@ -229,9 +230,9 @@ pub fn estimate(
     let (all, unloaded) = draws::totals(&full, &empty, &gravity)?;
     let platform = match unloaded {
         None => mechanism.robot.bodies[tool].inertia,
-        Some(t) => from_quantities(&t.values),
+        Some(t) => Inertia::from_quantities(&t.values),
     };
-    let inertia = difference(&from_quantities(&all.values), &platform);
+    let inertia = difference(&Inertia::from_quantities(&all.values), &platform);
     let c = draws::covariance(&full, &empty, &gravity, &inertia.0, &platform.0);
     let full: Vec<PlatformSample> = full.into_iter().flat_map(|c| c.samples).collect();
     let load = LoadBody::new(inertia, c, [true; 10], settings.consistent)?;

@@ -85,7 +85,7 @@ pub use tree::{Builder, Place};
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::robot::{Joint, JointTerm, Limits, Motion, Robot};
+use crate::robot::{Column, Inertia, Joint, JointTerm, Limits, Motion, Robot};
 use loops::Closure;
 use std::sync::Arc;
 
@@ -440,6 +440,28 @@ impl Mechanism {
             self.robot.joints[a].identify = JointTerm::ALL.map(|t| terms.contains(&t));
         }
         self.parameters.set_terms(&self.robot);
+        self
+    }
+
+    /// The same mechanism with the ten parameters of one body as the only unknowns beside those of its joints.
+    pub(crate) fn with_unknown_body(mut self, name: &str, body: usize) -> Self {
+        let groups = [Group::one(name, body, Pattern::Full)];
+        // all ten of one body: nothing of its inertia changes
+        self.parameters = Parameters::new(&mut self.robot, &groups).0;
+        self
+    }
+
+    /// The same mechanism with a load in one of its bodies.
+    pub(crate) fn carrying(mut self, body: usize, load: &Inertia) -> Self {
+        let own = &mut self.robot.bodies[body].inertia;
+        *own = *own + *load;
+        for p in &mut self.parameters.list {
+            if let Column::Inertial { body: b, k } = p.kind
+                && b == body
+            {
+                p.value += load.0[k];
+            }
+        }
         self
     }
 

@@ -1,7 +1,9 @@
 //! The robot with other values of its unknowns.
 
 use super::{Column, Plant};
-use crate::robot::Robot;
+use crate::robot::JointTerm;
+use crate::robot::{Inertia, Robot};
+use std::sync::Arc;
 
 impl Plant {
     /// The bodies and joint terms with the values `phi` of [`Plant::parameters`]; of a closed chain its
@@ -45,5 +47,46 @@ impl Plant {
             Column::Nuisance => 0.0,
         };
         self.parameters().iter().map(|p| of(p.kind)).collect()
+    }
+
+    /// The same robot with a load in the body that carries it ([`Plant::tool`]); unchanged where there is none.
+    pub fn carrying(&self, load: &Inertia) -> Plant {
+        let Some(tool) = self.tool() else {
+            return self.clone();
+        };
+        let other: Plant = match self.mechanism.clone() {
+            None => {
+                let mut robot = self.robot.clone();
+                let own = &mut robot.bodies[tool].inertia;
+                *own = *own + *load;
+                robot.into()
+            }
+            Some(mechanism) => Arc::unwrap_or_clone(mechanism).carrying(tool, load).into(),
+        };
+        Plant {
+            collisions: self.collisions,
+            scene: self.scene.clone(),
+            ..other
+        }
+    }
+
+    /// The same robot with fewer unknowns: of a closed chain the ten of the body that carries a load, and of every robot
+    /// Coulomb and viscous friction and a constant of each actuator. A tree keeps its bodies as unknowns.
+    pub(crate) fn asked_for_its_tool(&self, tool: usize) -> Plant {
+        let plain: Plant = match self.mechanism.clone() {
+            None => return self.clone().with_terms(&JointTerm::FRICTION),
+            Some(mechanism) => {
+                let name = self.robot.bodies[tool].name.clone();
+                Arc::unwrap_or_clone(mechanism)
+                    .with_unknown_body(&name, tool)
+                    .into()
+            }
+        };
+        Plant {
+            collisions: self.collisions,
+            scene: self.scene.clone(),
+            ..plain
+        }
+        .with_terms(&JointTerm::FRICTION)
     }
 }

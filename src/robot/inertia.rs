@@ -25,6 +25,10 @@ pub const UNITS: [&str; PARAMETERS] = [
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Inertia(pub [f64; PARAMETERS]);
 
+/// Mass (kg), centre of mass x, y, z (m), tensor about it (kg m²) xx, xy, xz, yy, yz, zz: what people say of a body, as
+/// in `load.json`.
+pub type Quantities = [f64; PARAMETERS];
+
 /// Skew-symmetric matrix: `skew(a) b = a × b`.
 pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
@@ -76,6 +80,47 @@ impl Inertia {
             }
             None => self.tensor(),
         }
+    }
+
+    /// Mass, centre of mass, tensor about it: see [`Quantities`].
+    pub fn quantities(&self) -> Quantities {
+        let c = self.com().unwrap_or_else(Vector3::zeros);
+        let i = self.tensor_com();
+        [
+            self.mass(),
+            c.x,
+            c.y,
+            c.z,
+            i.m11,
+            i.m12,
+            i.m13,
+            i.m22,
+            i.m23,
+            i.m33,
+        ]
+    }
+
+    /// The body with these [`Quantities`].
+    pub fn from_quantities(v: &Quantities) -> Self {
+        let tensor = Matrix3::new(v[4], v[5], v[6], v[5], v[7], v[8], v[6], v[8], v[9]);
+        Self::from_com(v[0], Vector3::new(v[1], v[2], v[3]), tensor)
+    }
+
+    /// Derivatives of the [`Quantities`] (rows) by the ten parameters (columns), by central differences: the map is a
+    /// rational function of low order.
+    pub fn quantity_slopes(&self) -> [Quantities; PARAMETERS] {
+        let scale = self.0.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-12);
+        let h = 1e-6 * scale;
+        let at = |k: usize, step: f64| {
+            let mut p = self.0;
+            p[k] += step;
+            Inertia(p).quantities()
+        };
+        let columns: [Quantities; PARAMETERS] = std::array::from_fn(|k| {
+            let (up, down) = (at(k, h), at(k, -h));
+            std::array::from_fn(|i| (up[i] - down[i]) / (2.0 * h))
+        });
+        std::array::from_fn(|i| std::array::from_fn(|k| columns[k][i]))
     }
 
     /// This body seen from a parent frame `A`, when this frame `B` sits there with rotation

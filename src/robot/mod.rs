@@ -158,6 +158,10 @@ impl JointTerm {
         JointTerm::Offset,
     ];
 
+    /// What a drive adds to the torque of the bodies: Coulomb and viscous friction, and a constant.
+    pub const FRICTION: [JointTerm; 3] =
+        [JointTerm::Coulomb, JointTerm::Viscous, JointTerm::Offset];
+
     /// Name as in `robot.toml`.
     pub fn name(self) -> &'static str {
         match self {

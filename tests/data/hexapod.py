@@ -175,6 +175,18 @@ def motion(kind, t, seed):
     return sines(t, lists)
 
 
+def designed(path, t):
+    """The Fourier series of a trajectory file, with their derivatives."""
+    with open(path) as file:
+        series = json.load(file)
+    w = 2 * np.pi * np.array(series["harmonics"]) / series["period"]
+    s, c = (np.array([joint[k] for joint in series["coefficients"]]) for k in ("sin", "cos"))
+    angle = np.outer(t, w)
+    sin, cos = np.sin(angle), np.cos(angle)
+    x = np.array([joint["constant"] for joint in series["coefficients"]]) + sin @ s.T + cos @ c.T
+    return x, (cos * w) @ s.T - (sin * w) @ c.T, -(sin * w**2) @ s.T - (cos * w**2) @ c.T
+
+
 def coloured(n, r, size, rate, corner):
     """First-order noise, by its spectrum."""
     m = n + 2000
@@ -211,8 +223,11 @@ def record(m, c, seed, machine_seed, load, offset):
     r = np.random.default_rng(seed)
     n = int(c["rate"] * c["seconds"])
     t = np.arange(n) / c["rate"]
-    x, xd, xdd = motion(c["motion"], t, machine_seed)
-    x[:, :3] += m["home"]
+    if c["motion"].endswith(".json"):
+        x, xd, xdd = designed(c["motion"], t)
+    else:
+        x, xd, xdd = motion(c["motion"], t, machine_seed)
+        x[:, :3] += m["home"]
     for j in range(6):
         for to, add in zip((x, xd, xdd), wandering(n, c["rate"], r, 3e-5 if j < 3 else 1e-4)):
             to[:, j] += add
@@ -272,7 +287,7 @@ def write_robot(path, m, c, seed):
 
 
 ORDINARY = dict(motion="rich", noise=1.0, mass=22.26, zeros=0.0, sticks=False, stribeck=1.0, geometry=0.0, legs=0.0,
-                seconds=60, rate=500, encoder=5e-6, pressures=False)
+                seconds=60, rate=500, period=10.0, encoder=5e-6, pressures=False)
 
 CONDITIONS = {
     "ordinary": {},
@@ -293,6 +308,17 @@ CONDITIONS = {
 }
 
 
+def design(folder, c, seed, excite, question):
+    """The motion that the library designs for this machine, from its robot file alone."""
+    os.makedirs(folder, exist_ok=True)
+    if not os.path.exists(f"{folder}/trajectory.json"):
+        write_robot(f"{folder}/robot.toml", make_machine(seed), c, seed)
+        command = [excite, "design", f"{folder}/robot.toml", *question, "--starts", "8", "--output", folder, "--force"]
+        subprocess.run(command, check=True, capture_output=True)
+    with open(f"{folder}/trajectory.json") as file:
+        return f"{folder}/trajectory.json", json.load(file)["period"]
+
+
 def make(folder, c, seed):
     os.makedirs(folder, exist_ok=True)
     m, load, r = make_machine(seed), make_load(c["mass"], seed), np.random.default_rng(31 + seed)
@@ -304,7 +330,7 @@ def make(folder, c, seed):
     with open(f"{folder}/experiment.toml", "w") as file:
         file.write('robot = "robot.toml"\n')
         for name, payload in (("empty", "none"), ("loaded", "unknown")):
-            file.write(f'[[record]]\nlog = "{name}.csv"\nuse = "fit"\nperiod = 10.0\npayload = "{payload}"\n')
+            file.write(f'[[record]]\nlog = "{name}.csv"\nuse = "fit"\nperiod = {c["period"]}\npayload = "{payload}"\n')
     return load
 
 
@@ -342,6 +368,8 @@ def main():
     parser.add_argument("--machines", type=int, default=8)
     parser.add_argument("--conditions", default="", help="only those whose name has this in it")
     parser.add_argument("--output", default="target/hexapod")
+    parser.add_argument("--design", metavar="OPTIONS", help="move as `excite design OPTIONS` says, `--for load`, instead of by "
+                        "sines that are not designed")
     parser.add_argument("--check", metavar="FOLDER", help="compare the forces with sg_model.json and sg_cases.json")
     args = parser.parse_args()
     if args.check:
@@ -355,6 +383,9 @@ def main():
         c = ORDINARY | change | dict(number=number)
         found = {"one_step": ([], []), "two_step": ([], [])}
         for seed in range(args.machines):
+            if args.design and c["motion"] != "paper":
+                to = f"{args.output}/design_{seed}"
+                c["motion"], c["period"] = design(to, ORDINARY, seed, args.excite, args.design.split())
             folder = f"{args.output}/{name.replace(' ', '_').replace(chr(39), '')}_{seed}"
             load = make_load(c["mass"], seed) if os.path.exists(f"{folder}/experiment.toml") else make(folder, c, seed)
             run = subprocess.run([args.excite, "load", f"{folder}/experiment.toml", "--output", f"{folder}/out", "--force"],

@@ -6,7 +6,7 @@ use crate::common::noise::normal;
 use crate::common::parallel::{matrix, numbers, vector};
 use crate::common::shared::checks;
 use excite::dynamics::Samples;
-use excite::load::body::{from_quantities, quantities};
+
 use excite::load::two_step::PlatformSample;
 use excite::load::{Identified, Loaded, Parameters, Settings, from_records};
 use excite::log::{Payload, Purpose};
@@ -243,8 +243,8 @@ fn the_published_equations_hold_for_the_reference_samples() {
         v[0] = case["m"].as_f64().unwrap();
         v[1..4].copy_from_slice(r.as_slice());
         v[4..].copy_from_slice(&jc);
-        let total = from_quantities(&v);
-        let back = quantities(&total);
+        let total = Inertia::from_quantities(&v);
+        let back = total.quantities();
         assert!(largest(&errors(&back, &v)) < 1e-9);
         let load = case["load_r"].as_array().unwrap();
         let lj = matrix(&case["load_JC"]);
@@ -253,7 +253,7 @@ fn the_published_equations_hold_for_the_reference_samples() {
             Vector3::from_iterator(load.iter().map(|x| x.as_f64().unwrap())),
             lj,
         );
-        assert!(largest(&errors(&quantities(&load), &LOAD)) < 1e-8);
+        assert!(largest(&errors(&load.quantities(), &LOAD)) < 1e-8);
         // and the rest is a platform of 30 kg that can exist
         let platform = excite::load::body::difference(&total, &load);
         assert!((platform.mass() - 30.0).abs() < 1e-9);
@@ -264,7 +264,7 @@ fn the_published_equations_hold_for_the_reference_samples() {
 #[test]
 fn both_methods_are_exact_without_noise() {
     let truth = Truth {
-        load: Some(from_quantities(&LOAD)),
+        load: Some(Inertia::from_quantities(&LOAD)),
         ..Truth::default()
     };
     let found = hexapod(&truth, 100.0, 500, 3, &Settings::default());
@@ -302,7 +302,7 @@ fn both_methods_are_exact_without_noise() {
 #[test]
 fn stribeck_friction_and_noise_stay_within_the_targets() {
     let truth = Truth {
-        load: Some(from_quantities(&LOAD)),
+        load: Some(Inertia::from_quantities(&LOAD)),
         stribeck: 15.0,
         // 2 N at 1 kHz: mean of 20 periods of 10 s, at 100 Hz
         noise: 0.14,
@@ -334,7 +334,7 @@ fn stribeck_friction_and_noise_stay_within_the_targets() {
 #[test]
 fn stated_deviations_cover_the_errors() {
     let truth = Truth {
-        load: Some(from_quantities(&LOAD)),
+        load: Some(Inertia::from_quantities(&LOAD)),
         noise: 2.0,
         ..Truth::default()
     };
@@ -356,7 +356,7 @@ fn stated_deviations_cover_the_errors() {
 #[test]
 fn payload_of_a_serial_robot() {
     let plant = Plant::load("ur10e").unwrap();
-    let load = from_quantities(&[
+    let load = Inertia::from_quantities(&[
         4.2, 0.02, -0.03, 0.08, 0.02, 0.001, -0.002, 0.025, 0.0015, 0.018,
     ]);
     let truth = Truth {
@@ -379,7 +379,7 @@ fn payload_of_a_serial_robot() {
         ]
     };
     let found = from_records(&plant, records(), &Settings::default()).unwrap();
-    let e = errors(&found.load().values(), &quantities(&load));
+    let e = errors(&found.load().values(), &load.quantities());
     assert!(largest(&e) < 1e-5, "{e:?}");
     assert!(found.two_step.is_none() && !found.no_two_step.is_empty());
     // mass and centre of mass of a point mass
@@ -409,7 +409,7 @@ fn a_known_load_tells_the_drive_gains() {
     let known = [6.0, 0.0, 0.02, 0.1, 0.03, 0.0, 0.0, 0.03, 0.0, 0.02];
     let unknown = [4.0, 0.03, 0.0, 0.07, 0.02, 0.0, 0.0, 0.02, 0.0, 0.015];
     let truth = |load: Option<[f64; 10]>| Truth {
-        load: load.map(|l| from_quantities(&l)),
+        load: load.map(|l| Inertia::from_quantities(&l)),
         noise: 0.05,
         gain: vec![1.0, 1.06, 1.0, 1.0, 1.0, 1.0],
         ..Truth::default()
@@ -442,7 +442,7 @@ fn a_load_that_cannot_exist_is_moved_to_one_that_can() {
     // a thin rod whose estimate is drowned in noise
     let thin = [1.5, 0.0, 0.0, 0.02, 1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-6];
     let truth = Truth {
-        load: Some(from_quantities(&thin)),
+        load: Some(Inertia::from_quantities(&thin)),
         noise: 4.0,
         ..Truth::default()
     };
@@ -467,7 +467,7 @@ fn robots_with_few_axes_say_what_they_cannot_tell() {
     let plant = Plant::load("planar2").unwrap();
     let x = multisine(&plant, 400, 100.0, &[1.0, 2.0, 3.0], 1);
     let truth = Truth {
-        load: Some(from_quantities(&[
+        load: Some(Inertia::from_quantities(&[
             1.0, 0.05, 0.02, 0.0, 0.01, 0.0, 0.0, 0.01, 0.0, 0.01,
         ])),
         ..Truth::default()
@@ -582,7 +582,7 @@ fn rocking(seed: u64, zero: [f64; 6]) -> Identified {
         ..Truth::default()
     };
     let truth = Truth {
-        load: Some(from_quantities(&LOAD)),
+        load: Some(Inertia::from_quantities(&LOAD)),
         zero,
         noise: 0.3,
         ..Truth::default()

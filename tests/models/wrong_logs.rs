@@ -2,10 +2,11 @@
 
 use crate::common::noise::normal;
 use excite::dynamics::Samples;
-use excite::load::body::from_quantities;
+
 use excite::load::{Settings, identify};
 use excite::log::Experiment;
 use excite::plant::Plant;
+use excite::robot::Inertia;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write as _;
@@ -49,7 +50,7 @@ impl Table {
         let mut tau = plant.nominal_torque(&x).unwrap();
         if loaded {
             let load = [12.0, 0.02, -0.03, 0.1, 0.12, 0.0, 0.0, 0.14, 0.0, 0.1];
-            let load = from_quantities(&load);
+            let load = Inertia::from_quantities(&load);
             let w = plant.body_columns(plant.tool().unwrap(), &x).unwrap();
             for (i, t) in tau.iter_mut().enumerate() {
                 *t += (0..10).map(|k| w[(i, k)] * load.0[k]).sum::<f64>();

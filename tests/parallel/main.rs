@@ -8,4 +8,5 @@ mod files;
 mod identities;
 mod loops;
 mod new_mechanism;
+mod questions;
 mod reference;

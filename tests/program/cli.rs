@@ -719,3 +719,80 @@ fn every_command_keeps_to_the_exit_status() {
     }
     assert!(!t.path().join("out").exists(), "a failure makes no folder");
 }
+
+#[test]
+fn a_motion_for_a_load_states_its_accuracy() {
+    let t = Test::new();
+    let load = "4,0.02,0,0.1,0.02,0,0,0.02,0,0.02";
+    let out = t.run(&format!(
+        "design delta --for load --payload {load} --starts 1 --harmonics 4 --output a"
+    ));
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(out.stdout.contains("load of 4.0000 kg"), "{}", out.stdout);
+    let report = t.json("a/report.json");
+    let c = &report["condition_number"];
+    assert_eq!(c["headline"], "normalised");
+    let headline = format!(
+        "condition number of unit columns {:.3}",
+        c["normalised"].as_f64().unwrap()
+    );
+    assert!(out.stdout.contains(&headline), "{headline}\n{}", out.stdout);
+    assert_eq!(report["load"]["payload"]["mass"], 4.0);
+    assert_eq!(report["load"]["limits_satisfied"], true);
+    assert!(report["load"]["std"]["mass"].as_f64().unwrap() > 0.0);
+    // a platform that does not turn tells no tensor
+    assert!(report["load"]["std"]["inertia_com"][0].is_null());
+    assert_eq!(report["settings"]["for"], "load");
+    // the experiment waits for its logs
+    for (log, load) in [("empty", ""), ("loaded", &format!(" --payload {load}"))] {
+        let line = format!(
+            "simulate delta a/trajectory.json --periods 2 --rate 200 --output a/{log}.csv{load}"
+        );
+        let out = t.run(&line);
+        assert_eq!(out.status, 0, "{}", out.stderr);
+    }
+    let found = t.run("load a/experiment.toml --output l");
+    assert_eq!(found.status, 0, "{}", found.stderr);
+    let mass = t.json("l/load.json")["mass"]["value"].as_f64().unwrap();
+    assert!((mass - 4.0).abs() < 0.2, "{mass}");
+    // any trajectory can be asked, and tells the same of the same load
+    let again = t.run(&format!(
+        "identifiability delta a/trajectory.json --payload {load} --output b"
+    ));
+    assert_eq!(again.status, 0, "{}", again.stderr);
+    assert_eq!(t.json("b/report.json")["load"], report["load"]);
+    assert!(t.run("identifiability planar2 --output c").status == 0);
+    assert!(t.json("c/report.json")["load"].is_null());
+}
+
+#[test]
+fn questions_that_mean_nothing_have_status_2() {
+    let t = Test::new();
+    t.fails(
+        "design planar2 --for platform",
+        2,
+        &["--for platform", "no parallel robot"],
+    );
+    t.fails(
+        "design planar2 --for legs",
+        2,
+        &["--for legs", "no parallel robot"],
+    );
+    t.fails(
+        "design planar2 --for friction --payload 1,0,0,0",
+        2,
+        &["--for load"],
+    );
+    t.fails("design planar2 --payload 1,0,0,0", 2, &["--for load"]);
+    t.fails(
+        "design planar2 --for load --payload -1,0,0,0",
+        2,
+        &["--payload"],
+    );
+    t.fails(
+        "design planar2 --for load --criterion d",
+        2,
+        &["--criterion"],
+    );
+    t.fails("design planar2 --for wings", 2, &["load"]);
+}

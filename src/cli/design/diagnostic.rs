@@ -156,7 +156,7 @@ fn judged(plant: &Plant, m: &Motion) -> Result<Value> {
 
 /// The robot as an `experiment.toml` in `folder` names it: a file relative to that folder, any other
 /// name as it is.
-fn robot_from(folder: &Path, spec: &str) -> String {
+pub(super) fn robot_from(folder: &Path, spec: &str) -> String {
     let parts = |path: &Path| -> Vec<PathBuf> {
         let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         let plain = |c: &Component| !matches!(c, Component::CurDir);

@@ -85,8 +85,17 @@ fn design(file: &str, space: Option<Space>, s: &Settings) -> String {
     parts.push(format!("--periods {}", s.periods));
     parts.push(format!("--grid {}", s.grid.name()));
     parts.push(format!("--ends {}", s.ends.name()));
-    parts.push(format!("--criterion {}", word(s.criterion)));
-    parts.push(format!("--condition {}", word(s.condition)));
+    match s.question {
+        Some(question) => parts.push(format!("--for {}", question.name())),
+        None => {
+            parts.push(format!("--criterion {}", word(s.criterion)));
+            parts.push(format!("--condition {}", word(s.condition)));
+        }
+    }
+    if let Some(load) = &s.payload {
+        let load: Vec<String> = load.iter().map(f64::to_string).collect();
+        parts.push(format!("--payload {}", load.join(",")));
+    }
     parts.push(format!("--derate {}", s.derate));
     parts.push(format!("--seed {}", s.seed));
     if let Some(start) = &s.start {

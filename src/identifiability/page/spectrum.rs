@@ -1,6 +1,7 @@
 //! Singular values and the course of the design.
 
 use crate::design::criterion::{Condition, Criterion};
+use crate::design::question::Question;
 use crate::design::record::{Record, Status};
 use crate::design::settings::Settings;
 use crate::identifiability::Assessment;
@@ -113,6 +114,19 @@ fn criterion(s: &Settings) -> String {
         Condition::Normalised => "column-normalised",
         Condition::Weighted => "noise-weighted",
     };
+    match s.question {
+        Some(Question::Legs) => {
+            return "base parameters of the legs that will not be known to 10\u{a0}% (a soft count)"
+                .into();
+        }
+        Some(q) => {
+            return format!(
+                "standard deviations for --for {}, over the accuracies that count as one",
+                q.name()
+            );
+        }
+        None => {}
+    }
     match s.criterion {
         Criterion::Condition => format!("condition number ({matrix})"),
         Criterion::D => format!("D criterion: det^(−1/2r) ({matrix})"),

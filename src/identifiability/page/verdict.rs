@@ -112,6 +112,8 @@ pub fn verdict(a: &Assessment) -> Verdict {
     };
     let mut broken = violations(&a.robot, e);
     broken.splice(0..0, too_near(e));
+    let loaded = a.load.as_ref().and_then(|l| l.broken.as_ref());
+    broken.extend(loaded.map(|why| format!("with the load, {why}")));
     let unchecked = collisions(e);
     if !e.certificate.satisfied || !broken.is_empty() {
         let more = match broken.len().saturating_sub(1) {
@@ -143,10 +145,7 @@ pub fn verdict(a: &Assessment) -> Verdict {
         .iter()
         .filter(|p| p.std.is_nan() || p.std >= 1e299)
         .count();
-    let condition = match e.platform {
-        Some(_) => e.condition.normalised,
-        None => e.condition.invariant,
-    };
+    let condition = a.condition().map_or(f64::INFINITY, |c| c.1);
     if condition.is_nan() || condition > UNEXCITED || lost > 0 {
         return Verdict {
             grade: Grade::Unexciting,

@@ -7,10 +7,11 @@
 //! autocorrelated as it is. The covariance is the mean
 //! square about the estimate: where noise moves the mean, as it does that of `1/m`, the shift is in it.
 
-use super::{PlatformSample, Total, from_quantities, total};
+use super::{PlatformSample, Total, total};
 use crate::error::Result;
 use crate::load::one_step::{Solver, noise_like, rms};
 use crate::load::weight::Spread;
+use crate::robot::Inertia;
 use faer::Mat;
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -148,10 +149,10 @@ pub fn covariance(
     platform: &[f64; 10],
 ) -> Mat<f64> {
     let one = |k: usize| -> Option<[f64; 10]> {
-        let all = from_quantities(&together(full, Some(k), gravity).ok()?.values).0;
+        let all = Inertia::from_quantities(&together(full, Some(k), gravity).ok()?.values).0;
         let other = match empty.is_empty() {
             true => *platform,
-            false => from_quantities(&together(empty, Some(k), gravity).ok()?.values).0,
+            false => Inertia::from_quantities(&together(empty, Some(k), gravity).ok()?.values).0,
         };
         Some(std::array::from_fn(|i| all[i] - other[i] - found[i]))
     };
