@@ -117,6 +117,8 @@ pub fn run(args: Args) -> Result<()> {
             percent(f.explains),
             match f.holdout {
                 Some(h) => format!("{} on holdout", percent(h)),
+                // a load that some records carry shows in their parameters
+                None if !f.records.is_empty() => format!("shown by {}", f.records.join(", ")),
                 None => "no holdout record".into(),
             }
         );

@@ -13,6 +13,7 @@
 
 mod clearance;
 mod elsewhere;
+mod hardly_moved;
 #[doc(hidden)]
 pub mod json;
 mod load;
@@ -219,6 +220,10 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
     };
     all.warnings
         .extend(unexcited(&condition, platform.is_some()));
+    all.warnings.extend(hardly_moved::warning(
+        &certified.actuators,
+        &plant.actuators(),
+    ));
     let torque = plant.nominal_torque(&motion)?;
     let actuators = plant.actuator_motion(&motion)?;
     let view = page::view::fill(

@@ -441,6 +441,22 @@ fn looked_at(scene: &Scene, a: &str, b: &str) -> bool {
     names.any(|n| n == [a, b] || n == [b, a])
 }
 
+/// The robot file that is written leaves the same pairs out, wherever it goes.
+#[test]
+fn a_written_robot_file_knows_its_srdf() {
+    let file = toml("[collision]\nsrdf = \"arm.srdf\"\n");
+    let dir = folder(&[("arm.urdf", &plain()), ("robot.toml", &file)]);
+    let pair = r#"<robot name="arm"><disable_collisions link1="base" link2="lower"/></robot>"#;
+    put(dir.path(), "arm.srdf", pair);
+    let urdf = dir.path().join("arm.urdf");
+    let written = load(&dir, "robot.toml")
+        .robot()
+        .to_toml_template(&urdf.to_string_lossy());
+    let other = folder(&[("again.toml", &written)]);
+    let scene = load(&other, "again.toml").scene().unwrap().unwrap();
+    assert!(!looked_at(&scene, "base", "lower"));
+}
+
 #[test]
 fn an_srdf_leaves_pairs_out() {
     let file = toml("[collision]\nsrdf = \"arm.srdf\"\n");

@@ -234,6 +234,15 @@ fn surroundings(robot: &Robot, out: &mut String) {
         "ignore = [{}]     # pairs of links that are not looked at",
         pairs.join(", ")
     );
+    if let Some(path) = &geometry.srdf {
+        // the file may go to another folder
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        let path = quoted(&path.to_string_lossy());
+        let _ = writeln!(
+            out,
+            "srdf = {path}     # its disabled pairs are not looked at"
+        );
+    }
     if let Some(check) = geometry.check {
         let _ = writeln!(
             out,
