@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ._command import Command
+    from ._condense import Factor, Merged, condense, merge
     from ._errors import Error, ExciteWarning, Notice
     from ._excite import __version__
     from ._posterior import Posterior
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 #: What is imported when it is used first: NumPy takes longer than all of this package.
 _PARTS = {
     "_command": ("Command",),
+    "_condense": ("Factor", "Merged", "condense", "merge"),
     "_errors": ("Error", "ExciteWarning", "Notice"),
     "_excite": ("__version__",),
     "_posterior": ("Posterior",),
@@ -77,9 +79,11 @@ __all__ = [
     "ExciteWarning",
     "Experiment",
     "Export",
+    "Factor",
     "Identification",
     "Interrupted",
     "Load",
+    "Merged",
     "Motion",
     "Notice",
     "Parameter",
@@ -94,12 +98,14 @@ __all__ = [
     "__version__",
     "assess",
     "calibrate",
+    "condense",
     "design",
     "diagnose",
     "export",
     "formats",
     "identify",
     "load",
+    "merge",
     "robots",
     "simulate",
     "verify",

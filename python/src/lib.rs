@@ -4,6 +4,7 @@
 //! them with one row a sample, without a copy.
 
 mod call;
+mod condense;
 mod design;
 mod error;
 mod named;
@@ -39,6 +40,9 @@ fn _excite(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(design::write_samples, m)?)?;
     m.add_function(wrap_pyfunction!(simulate::simulate, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::identify, m)?)?;
+    m.add_function(wrap_pyfunction!(condense::condense, m)?)?;
+    m.add_function(wrap_pyfunction!(condense::header, m)?)?;
+    m.add_function(wrap_pyfunction!(condense::merge, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::load, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::diagnose, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::calibrate, m)?)?;

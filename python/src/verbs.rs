@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Files of a model that can be written.
-fn texts(all: Vec<(&'static str, Result<String>)>) -> Vec<(String, String)> {
+pub fn texts(all: Vec<(&'static str, Result<String>)>) -> Vec<(String, String)> {
     let written = all
         .into_iter()
         .filter_map(|(n, t)| Some((n.into(), t.ok()?)));

@@ -30,6 +30,9 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
+    /// Write the model for these, too: sdf (Gazebo), usd, isaac-lab
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    also: Vec<String>,
     /// MJCF or URDF of the same robot, of which a copy with the result is written into the directory: only what
     /// differs is changed, comments and order stay
     #[arg(long, value_name = "SCENE")]
@@ -59,6 +62,8 @@ pub fn run(args: Args) -> Result<()> {
     experiment.press(outside(args.atmosphere)?)?;
     let mut names = vec!["diagnosis.json", "report.html", "next.json"];
     names.extend(export::files(&experiment.plant));
+    let further = export::further(&args.also, &experiment.plant)?;
+    names.extend(further.iter().map(|f| f.file()));
     let scene = into::planned(&experiment.plant, args.into.as_deref(), &args.output)?;
     names.extend(scene.iter().map(String::as_str));
     let folder = Folder::new(&args.output, &names, args.force)?;
@@ -84,6 +89,7 @@ pub fn run(args: Args) -> Result<()> {
         remarks: &d.improved.remarks,
     };
     let mut texts = export::write(&model);
+    texts.extend(further.iter().map(|f| (f.file(), f.write(&model))));
     let scene = into::edit(&model, args.into.as_deref(), &args.output, &mut texts)?;
     let mut more = model.warnings();
     more.extend(into::warnings(scene.as_ref()));

@@ -2,7 +2,7 @@
 
 use super::{Folder, into, print, unwritten, warn};
 use excite::controller::{Card, Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
-use excite::export::{Model, write};
+use excite::export::{self, Model, write};
 use excite::mechanism::bundled as parallel;
 use excite::output::write_atomic;
 use excite::robot::{Motion, bundled};
@@ -22,7 +22,8 @@ use std::path::{Path, PathBuf};
                   0.1 plays the same path at a tenth of the speed. Formats that are sent point by point need a \
                   motion that starts and ends at rest, or moves there and back (--approach, --return: CSV files \
                   with the columns t, q1 …, dq1 …, ddq1 … of the actuators).\n\nWith --to, a robot is written instead: \
-                  mujoco (robot.xml) or urdf (robot.urdf) into the directory of --output. With --into, a copy of \
+                  mujoco (robot.xml), urdf (robot.urdf), sdf \
+                  (robot.sdf), usd (robot.usda) or isaac-lab (actuators.py) into the directory of --output. With --into, a copy of \
                   your own MJCF or URDF has the values of the robot, and everything else stays as it is.",
     after_help = "Examples:\n  excite export out/trajectory.json --format urscript --speed 0.1\n  excite export \
                   out/trajectory.json --format ros2 --approach moves/approach.csv --return moves/return.csv\n  excite \
@@ -37,7 +38,7 @@ pub struct Args {
     #[arg(short, long, value_name = "NAME", required_unless_present_any = ["list", "to"])]
     format: Option<String>,
     /// Write a robot for a simulator in place of a trajectory
-    #[arg(long, value_name = "NAME", value_parser = ["mujoco", "urdf"], conflicts_with_all = ["format", "list", "robot",
+    #[arg(long, value_name = "NAME", value_parser = ["mujoco", "urdf", "sdf", "usd", "isaac-lab"], conflicts_with_all = ["format", "list", "robot",
         "rate", "periods", "speed", "approach", "retreat", "joints", "columns", "unit", "move_to_start"])]
     to: Option<String>,
     /// With --to: MJCF or URDF of the same robot, of which a copy with the values of the robot is written
@@ -166,18 +167,36 @@ pub fn run(args: Args) -> Result<()> {
 /// Writes a robot for a simulator.
 fn robot_to(args: &Args, to: &str, spec: &str) -> Result<()> {
     let plant = Plant::load(spec)?;
-    let file = match to {
-        "mujoco" => "robot.xml",
-        _ => "robot.urdf",
-    };
     let output = args.output.clone().unwrap_or("out".into());
     let model = Model {
         plant: &plant,
         robot: plant.robot(),
         remarks: &[],
     };
-    let mut texts = write(&model);
-    texts.retain(|(name, _)| *name == file);
+    let further = !matches!(to, "mujoco" | "urdf");
+    if further && args.into.is_some() {
+        return Err(Error::Argument(format!(
+            "--into takes an MJCF or a URDF: --to mujoco or --to urdf, not {to}"
+        )));
+    }
+    let mut texts: Vec<(&'static str, Result<String>)> = match further {
+        true => {
+            let formats = export::further(&[to.to_string()], &plant)?;
+            formats
+                .iter()
+                .map(|f| (f.file(), f.write(&model)))
+                .collect()
+        }
+        false => {
+            let file = if to == "mujoco" {
+                "robot.xml"
+            } else {
+                "robot.urdf"
+            };
+            let all = write(&model).into_iter();
+            all.filter(|(name, _)| *name == file).collect()
+        }
+    };
     let scene = into::edit(&model, args.into.as_deref(), &output, &mut texts)?;
     let names = scene.as_ref().map(|s| s.names()).unwrap_or_default();
     // a robot of the user's own file is in that file

@@ -30,6 +30,9 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
+    /// Write the model for these, too: sdf (Gazebo), usd, isaac-lab
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    also: Vec<String>,
     /// MJCF or URDF of the same robot, of which a copy with the result is written into the directory: only what
     /// differs is changed, comments and order stay
     #[arg(long, value_name = "SCENE")]
@@ -102,6 +105,8 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.measured_rates = !args.derive;
     let mut names = vec!["model.json", "report.json", "report.html"];
     names.extend(export::files(&experiment.plant));
+    let further = export::further(&args.also, &experiment.plant)?;
+    names.extend(further.iter().map(|f| f.file()));
     let scene = into::planned(&experiment.plant, args.into.as_deref(), &args.output)?;
     names.extend(scene.iter().map(String::as_str));
     let folder = Folder::new(&args.output, &names, args.force)?;
@@ -118,6 +123,7 @@ pub fn run(args: Args) -> Result<()> {
         remarks: &[],
     };
     let mut texts = export::write(&model);
+    texts.extend(further.iter().map(|f| (f.file(), f.write(&model))));
     id.scene = into::edit(&model, args.into.as_deref(), &args.output, &mut texts)?;
     id.warnings.extend(into::warnings(id.scene.as_ref()));
     id.warnings.extend(model.warnings());

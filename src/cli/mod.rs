@@ -2,6 +2,7 @@
 //! unusable arguments. Nothing but results goes to standard output.
 
 mod calibrate;
+mod condense;
 pub mod design;
 mod diagnose;
 pub mod export;
@@ -10,6 +11,7 @@ pub mod identify;
 mod into;
 mod load;
 mod log;
+mod merge;
 mod moves;
 mod new;
 mod poses;
@@ -46,6 +48,8 @@ enum Command {
     Design(design::Args),
     Identifiability(identifiability::Args),
     Identify(identify::Args),
+    Condense(condense::Args),
+    Merge(merge::Args),
     Torque(torque::Args),
     Diagnose(diagnose::Args),
     Move(moves::Args),
@@ -79,6 +83,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Design(a) => design::run(a),
         Command::Identifiability(a) => identifiability::run(a),
         Command::Identify(a) => identify::run(a),
+        Command::Condense(a) => condense::run(a),
+        Command::Merge(a) => merge::run(a),
         Command::Torque(a) => torque::run(a),
         Command::Diagnose(a) => diagnose::run(a),
         Command::Move(a) => moves::run(a),

@@ -7,6 +7,8 @@
 //! | `effects.py` | `effects` | what MuJoCo has no element for, as functions of state and time step | serial |
 //! | `robot.toml` | `robot_toml`, [`mechanism`] | what the other commands read, geometry and loops included | all |
 //!
+//! On demand ([`further`]): `robot.sdf` (Gazebo), `robot.usda` (USD physics), `actuators.py` (Isaac Lab).
+//!
 //! [`into_scene`] writes a model into an MJCF or URDF of its user, where only what differs is changed.
 //!
 //! A new format is one file with an implementation of [`Format`], and one line in [`FORMATS`]. What a model
@@ -15,15 +17,18 @@
 
 pub(crate) mod effects;
 pub(crate) mod element;
+pub(crate) mod isaac_lab;
 #[doc(hidden)]
 pub mod mechanism;
 pub(crate) mod mujoco;
 pub(crate) mod remark;
 pub(crate) mod robot_toml;
 pub(crate) mod scene;
+pub(crate) mod sdf;
 pub(crate) mod simulator;
 #[doc(hidden)]
 pub mod urdf;
+pub(crate) mod usd;
 
 #[doc(hidden)]
 pub use element::{Element, Form};
@@ -111,6 +116,37 @@ pub const FORMATS: [&dyn Format; 4] = [
     &effects::Effects,
     &robot_toml::RobotToml,
 ];
+
+/// Formats that are written where they are asked for, by their names on the command line. None was run in its simulator.
+#[doc(hidden)]
+pub const FURTHER: [(&str, &dyn Format); 3] = [
+    ("sdf", &sdf::Sdf),
+    ("usd", &usd::Usd),
+    ("isaac-lab", &isaac_lab::IsaacLab),
+];
+
+/// The formats of [`FURTHER`] with these names, for a robot of this kind.
+///
+/// # Errors
+/// A name that there is not; a closed chain.
+pub fn further(names: &[String], plant: &Plant) -> Result<Vec<&'static dyn Format>> {
+    let one = |name: &String| {
+        let found = FURTHER.iter().find(|(n, _)| n == name).map(|(_, f)| *f);
+        let format = found.ok_or_else(|| {
+            let known: Vec<&str> = FURTHER.iter().map(|(n, _)| *n).collect();
+            crate::Error::Argument(format!("`{name}` is none of {}", known.join(", ")))
+        })?;
+        match format.holds(plant) {
+            true => Ok(format),
+            false => Err(crate::Error::Infeasible(format!(
+                "{}: closed chains are not written for {}",
+                plant.name(),
+                format.name()
+            ))),
+        }
+    };
+    names.iter().map(one).collect()
+}
 
 /// Names of the files that a robot of this kind may be written to.
 pub fn files(plant: &Plant) -> Vec<&'static str> {

@@ -36,7 +36,12 @@ pub fn predicts_worse(id: &Identification) -> Option<[f64; 2]> {
 
 fn worse(id: &Identification) -> Option<Warning> {
     let [held, nominal] = predicts_worse(id)?;
-    Some(Warning::new(
+    Some(worse_than_nominal(held, nominal))
+}
+
+/// What is said of a model with a larger relative error on motion that was not fitted than the nominal one.
+pub fn worse_than_nominal(held: f64, nominal: f64) -> Warning {
+    Warning::new(
         WarningKind::WorseThanNominal,
         "validation",
         format!(
@@ -45,7 +50,7 @@ fn worse(id: &Identification) -> Option<Warning> {
             percent(held),
             percent(nominal)
         ),
-    ))
+    )
 }
 
 /// Links whose mass is not what such a robot has.

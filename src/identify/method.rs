@@ -40,6 +40,17 @@ pub fn estimate(fit: &mut Fit, method: Method, warnings: &mut Vec<Warning>) -> R
     }
 }
 
+/// Ordinary or weighted least squares of equations alone.
+///
+/// # Errors
+/// Numbers that are not finite.
+pub fn of_stacks(stacks: &[&Stack], method: Method) -> Result<Estimate> {
+    match method {
+        Method::Ols => ordinary(stacks),
+        _ => weighted(stacks),
+    }
+}
+
 fn by(fit: &Fit, method: Method) -> Result<Estimate> {
     let stacks = fit.stacks();
     match method {

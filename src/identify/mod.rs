@@ -14,8 +14,11 @@
 //!    the prior is chosen by `cross_validation` over contiguous parts of the fit records.
 //! 5. `essential`: the base parameters that matter.
 //! 6. `validation`: residuals on fit and holdout records.
+//!
+//! [`condense`](condense()) reduces records to triangular factors, from which [`merge`](merge()) identifies.
 
 pub(crate) mod aside;
+pub(crate) mod condense;
 pub(crate) mod consistent;
 pub(crate) mod cross_validation;
 pub(crate) mod doubts;
@@ -27,6 +30,8 @@ pub(crate) mod identification;
 pub mod json;
 pub(crate) mod linear;
 pub(crate) mod lmi;
+pub(crate) mod merge;
+mod merge_page;
 pub(crate) mod method;
 pub(crate) mod normal;
 #[doc(hidden)]
@@ -41,9 +46,11 @@ pub(crate) mod uncertainty;
 pub(crate) mod validation;
 pub(crate) mod weights;
 
+pub use condense::{Factor, condense};
 pub use cross_validation::Trial;
 pub use essential::Essential;
 pub use identification::Identification;
+pub use merge::{Merged, merge};
 pub use settings::{Consistency, Method, Settings};
 pub use validation::{Errors, JointError, Validation};
 

@@ -36,12 +36,21 @@ pub fn residual_covariance(stacks: &[&Stack], pi: &[f64]) -> Mat<f64> {
 
 /// Covariance with noise of a millionth of the torque at least, so that a fit without residual has
 /// weights too, and a prior that can be felt.
-pub fn floored(mut c: Mat<f64>, stacks: &[&Stack]) -> Mat<f64> {
-    for a in 0..c.nrows() {
-        let size = stacks
+pub fn floored(c: Mat<f64>, stacks: &[&Stack]) -> Mat<f64> {
+    let largest = |a: usize| {
+        stacks
             .iter()
             .flat_map(|s| s.measured[a * s.count..(a + 1) * s.count].iter())
-            .fold(0.0f64, |m, x| m.max(x.abs()));
+            .fold(0.0f64, |m, x| m.max(x.abs()))
+    };
+    let sizes: Vec<f64> = (0..c.nrows()).map(largest).collect();
+    least(c, &sizes)
+}
+
+/// The same with the largest torque of each actuator.
+pub fn least(mut c: Mat<f64>, sizes: &[f64]) -> Mat<f64> {
+    for a in 0..c.nrows() {
+        let size = sizes.get(a).copied().unwrap_or(0.0);
         let least = (1e-6 * size.max(1e-6)).powi(2);
         if c[(a, a)] < least {
             for b in 0..c.nrows() {

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod condense;
 mod h4_identification;
 mod identify;
 mod load;

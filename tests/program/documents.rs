@@ -186,8 +186,29 @@ fn keys_of_a_serial_robots_files_are_documented() {
         "move planar2 d/trajectory.json --from 0.1,-0.2 --output d",
     );
     excite(at, "rehearse planar2 d/trajectory.json --output d");
-    excite(at, "identify log/experiment.toml --output model");
-    excite(at, "diagnose log/experiment.toml --no-next --output gap");
+    excite(at, "export planar2 --to mujoco --output mine");
+    excite(
+        at,
+        "identify log/experiment.toml --output model --into mine/robot.xml --also sdf,usd",
+    );
+    excite(
+        at,
+        "diagnose log/experiment.toml --no-next --output gap --into mine/robot.xml --also isaac-lab",
+    );
+    for file in [
+        "model/robot.sdf",
+        "model/robot.usda",
+        "gap/actuators.py",
+        "gap/scene_robot.xml",
+    ] {
+        assert!(at.join(file).is_file(), "{file} was not written");
+    }
+    excite(at, "condense log/experiment.toml --output all.factor");
+    excite(at, "merge all.factor --output merged --into mine/robot.xml");
+    compare(
+        "## Condensed records: `.factor`, and `merged.json`",
+        &[at.join("merged/merged.json")],
+    );
     compare(
         "## Report before the run: `report.json`",
         &[at.join("d/report.json"), at.join("robot/report.json")],

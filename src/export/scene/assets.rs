@@ -101,7 +101,7 @@ pub(super) fn names(scene: &Path, edits: &mut Edits, folder: &Path) -> Result<Ve
         }
     }
     for (s, range, name) in moved {
-        edits.put(s, range, name);
+        edits.put(s, range, &name);
     }
     Ok(names)
 }
@@ -146,7 +146,7 @@ pub(super) fn mjcf(scene: &Path, root: &Node, edits: &mut Edits, folder: &Path) 
         (None, Some(first)) if !missing.is_empty() => {
             let all: String = missing
                 .iter()
-                .map(|(n, v)| format!(" {n}=\"{v}\""))
+                .map(|(n, v)| format!(" {n}=\"{}\"", crate::export::escape(v)))
                 .collect();
             edits.before(first, &[format!("<compiler{all}/>")]);
             for (name, value) in missing {

@@ -64,6 +64,36 @@ fn the_same_model_changes_nothing_but_the_way_to_the_meshes() {
     assert!(edited.left_out.is_empty(), "{:?}", edited.left_out);
 }
 
+/// A folder of meshes whose name has to be quoted.
+#[test]
+fn names_of_folders_are_quoted() {
+    let dir = tempfile::tempdir().unwrap();
+    let home = dir.path().join("R&D 'lab'");
+    std::fs::create_dir(&home).unwrap();
+    let scene = home.join("scene.xml");
+    let text = SCENE.replace("  meshdir='meshes'", "");
+    for text in [
+        text.clone(),
+        text.replace("<compiler angle=\"degree\"/>", ""),
+    ] {
+        std::fs::write(&scene, &text).unwrap();
+        let at = text.find("    <body name=\"cube\"").unwrap();
+        let end = at + text[at..].find('\n').unwrap();
+        let own = format!("{}{}", &text[..at], &text[end..]);
+        let plant = Plant::from(Robot::from_urdf_str(&own, "two.xml").unwrap());
+        let model = Model {
+            plant: &plant,
+            robot: plant.robot(),
+            remarks: &[],
+        };
+        let edited = into_scene(&model, &scene, &dir.path().join("out")).unwrap();
+        let written = roxmltree::Document::parse(&edited.files[0].1).unwrap();
+        let mut compilers = written.descendants().filter(|n| n.has_tag_name("compiler"));
+        let meshes = compilers.next().unwrap().attribute("meshdir");
+        assert_eq!(meshes, Some("../R&D 'lab'"));
+    }
+}
+
 #[test]
 fn what_changes_is_said_and_all_else_stays() {
     let mut robot = plant().robot().clone();

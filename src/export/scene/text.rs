@@ -21,6 +21,11 @@ pub struct Change {
     pub new: Option<String>,
 }
 
+/// Text that may stand between quotes of either kind.
+fn quoted(text: &str) -> String {
+    super::super::escape(text).replace('\'', "&apos;")
+}
+
 /// The files, and what is to be changed in them.
 pub(super) struct Edits {
     pub(super) sources: Vec<Source>,
@@ -60,9 +65,9 @@ impl Edits {
         }
     }
 
-    /// Replaces bytes of a file by its number.
-    pub(super) fn put(&mut self, source: usize, range: Range<usize>, text: String) {
-        self.list.push((source, range, text));
+    /// Replaces the value of an attribute in a file by its number.
+    pub(super) fn put(&mut self, source: usize, range: Range<usize>, value: &str) {
+        self.list.push((source, range, quoted(value)));
     }
 
     pub(super) fn say(
@@ -93,10 +98,11 @@ impl Edits {
     ) {
         let old = node.own(name).or(was).map(String::from);
         match node.spans.get(name) {
-            Some([_, range]) => self.replace(node, range.clone(), value.clone()),
+            Some([_, range]) => self.replace(node, range.clone(), quoted(&value)),
             None => {
                 let at = self.after_attributes(node);
-                self.replace(node, at..at, format!(" {name}=\"{value}\""));
+                let text = format!(" {name}=\"{}\"", quoted(&value));
+                self.replace(node, at..at, text);
             }
         }
         self.say(node, of.into(), name, [old, Some(value)]);

@@ -1,0 +1,257 @@
+//! The model from condensed records ([`super::condense`]).
+
+use super::condense::{Factor, Part};
+use super::cross_validation::Trial;
+use super::essential::{self, Essential};
+use super::linear::{self, Weights};
+use super::normal::Normal;
+use super::settings::{Method, Settings};
+use super::stack::Stack;
+use super::validation::{Errors, JointError};
+use super::{doubts, standard, weights};
+use crate::base::BaseParameters;
+use crate::error::{Error, Result, Warning};
+use crate::plant::Plant;
+use faer::Mat;
+use serde_json::{Value, json};
+
+/// Rounds of the covariance between actuators, as in [`super::method`].
+const COVARIANCE_ROUNDS: usize = 2;
+
+/// A model from condensed records.
+#[derive(Debug, Clone)]
+pub struct Merged {
+    /// base parameters of the plant
+    pub base: BaseParameters,
+    /// estimate of the base parameters by the method alone
+    pub pi: Vec<f64>,
+    /// standard deviations of it
+    pub std: Vec<f64>,
+    /// the whole covariance
+    pub covariance: Mat<f64>,
+    /// variance through correlation in time, mean of those of the records alone
+    pub inflation: f64,
+    /// condition number of the weighted equations
+    pub condition: f64,
+    /// standard parameters
+    pub phi: Vec<f64>,
+    /// base parameters of `phi`
+    pub pi_consistent: Vec<f64>,
+    /// standard deviations of `phi`: data and prior
+    pub phi_std: Vec<f64>,
+    /// strength of the prior
+    pub prior_strength: f64,
+    /// how it was chosen
+    pub trials: Vec<Trial>,
+    /// whether every body can exist and no friction or armature is negative
+    pub consistent: bool,
+    /// essential parameters
+    pub essential: Essential,
+    /// covariance of the residual between actuators, (N m)²
+    pub residual_covariance: Mat<f64>,
+    /// residuals of the filtered equations: fit and holdout, of the nominal and of this model
+    pub errors: [[Option<Errors>; 2]; 2],
+    /// names of the records: fit and holdout
+    pub records: [Vec<String>; 2],
+    /// everything imperfect
+    pub warnings: Vec<Warning>,
+}
+
+/// Identifies a plant from condensed records.
+///
+/// # Errors
+/// A robot or parameters that are not those of the factors; a method that needs the samples; as
+/// [`identify`](super::identify).
+pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result<Merged> {
+    if !matches!(settings.method, Method::Ols | Method::Wls) {
+        return Err(Error::Argument(
+            "factors hold sums of products, not samples: the methods for them are ols and wls"
+                .into(),
+        ));
+    }
+    let mut all = factors.into_iter();
+    let first = all.next().ok_or_else(|| {
+        Error::Argument("no factor is named; make some with `excite condense`".into())
+    })?;
+    let factor = all.try_fold(first, Factor::add)?;
+    let base = plant.base()?;
+    let header = &factor.header;
+    let names: Vec<&str> = (0..base.count()).map(|k| base.name(k)).collect();
+    if header.hash != plant.robot().hash || header.names != names {
+        return Err(Error::Infeasible(format!(
+            "the factors are of another robot than {}, or of other parameters; name the robot file that they were \
+             condensed with",
+            plant.name()
+        )));
+    }
+    let mut warnings = plant.warnings().to_vec();
+    warnings.extend(base.warnings.iter().cloned());
+    warnings.extend(header.warnings.iter().cloned());
+    let part = &header.parts[0];
+    let stacks = factor.stacks(0);
+    let stacks: Vec<&Stack> = stacks.iter().collect();
+    let rows: f64 = part.used.iter().sum();
+    if rows < base.count() as f64 {
+        return Err(Error::Infeasible(format!(
+            "{rows} filtered equations cannot give {} base parameters: add records",
+            base.count()
+        )));
+    }
+    let (weights, pi) = estimate(&stacks, part, settings.method)?;
+    let folds: Vec<Mat<f64>> = stacks
+        .iter()
+        .map(|s| linear::factor(&linear::fold_factors(&[*s], &weights, 1)))
+        .collect();
+    let whole = linear::factor(&folds);
+    let solution = linear::solve(whole.as_ref())?;
+    let inflation = (part.inflated / rows).max(1.0);
+    let freedom = rows / (rows - base.count() as f64).max(1.0);
+    let covariance =
+        &linear::inverse_information(solution.r.as_ref())? * faer::Scale(inflation * freedom);
+    let normal = Normal {
+        folds,
+        factor: whole,
+        pi,
+        r: solution.r,
+        condition: 1.0 / solution.reciprocal_condition.max(1e-300),
+        weak: solution.weak,
+        covariance,
+        inflation,
+    };
+    warnings.extend(normal.warning(&base));
+    let found = standard::estimate(plant, &base, &normal, settings, &mut warnings)?;
+    let essential = essential::reduce(normal.factor.as_ref(), rows as usize, inflation)?;
+    let nominal = base.project(&plant.values());
+    let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
+    let errors = [0, 1].map(|p| {
+        let stacks = factor.stacks(p);
+        [&nominal, &found.pi].map(|pi| errors(&stacks, &header.parts[p], pi, &joints))
+    });
+    let of = |k: usize| errors[1][k].as_ref().map(|e: &Errors| e.relative_error);
+    if let (Some(before), Some(after)) = (of(0), of(1))
+        && after > before
+    {
+        warnings.push(doubts::worse_than_nominal(after, before));
+    }
+    Ok(Merged {
+        residual_covariance: covariance_of(&stacks, part, &normal.pi),
+        std: normal.std(),
+        pi: normal.pi,
+        covariance: normal.covariance,
+        inflation,
+        condition: normal.condition,
+        phi: found.phi,
+        pi_consistent: found.pi,
+        phi_std: found.std,
+        prior_strength: found.strength,
+        trials: found.trials,
+        consistent: found.consistent,
+        essential,
+        errors,
+        records: [0, 1].map(|p| header.parts[p].records.clone()),
+        warnings,
+        base,
+    })
+}
+
+/// Covariance of the residual between actuators: that of the rows, with the number of equations that they stand for.
+fn covariance_of(stacks: &[&Stack], part: &Part, pi: &[f64]) -> Mat<f64> {
+    let n = part.used.len();
+    let c = weights::residual_covariance(stacks, pi);
+    let taken = pi.len() as f64 / n.max(1) as f64;
+    let rows: usize = stacks.iter().map(|s| s.count).sum();
+    let had = (rows as f64 - taken).max(1.0);
+    let freedom = |a: usize| (part.used[a] - taken).max(1.0);
+    Mat::from_fn(n, n, |a, b| {
+        c[(a, b)] * had / (freedom(a) * freedom(b)).sqrt()
+    })
+}
+
+/// As the estimators of [`super::method`], step by step.
+fn estimate(stacks: &[&Stack], part: &Part, method: Method) -> Result<(Weights, Vec<f64>)> {
+    let n = part.used.len();
+    let solve = |w: &Weights| -> Result<Vec<f64>> {
+        let parts: Vec<Mat<f64>> = stacks
+            .iter()
+            .map(|s| linear::factor(&linear::fold_factors(&[*s], w, 1)))
+            .collect();
+        Ok(linear::solve(linear::factor(&parts).as_ref())?.pi)
+    };
+    let covariance = |pi: &[f64]| weights::least(covariance_of(stacks, part, pi), &part.largest);
+    let pi = solve(&Weights::diagonal(&vec![1.0; n]))?;
+    let c = covariance(&pi);
+    if method == Method::Ols {
+        let mean = (0..n).map(|a| c[(a, a)]).sum::<f64>() / n.max(1) as f64;
+        return Ok((Weights::diagonal(&vec![mean.sqrt(); n]), pi));
+    }
+    let mut weights = Weights::diagonal(&linear::deviations(&c));
+    let mut pi = solve(&weights)?;
+    for _ in 0..COVARIANCE_ROUNDS {
+        weights = Weights::covariance(covariance(&pi).as_ref());
+        pi = solve(&weights)?;
+    }
+    Ok((weights, pi))
+}
+
+fn errors(stacks: &[Stack], part: &Part, pi: &[f64], joints: &[String]) -> Option<Errors> {
+    if part.records.is_empty() {
+        return None;
+    }
+    let mut sums = vec![0.0; joints.len()];
+    for s in stacks {
+        let e = s.residual(pi);
+        for (a, sum) in sums.iter_mut().enumerate() {
+            *sum += e[a * s.count..(a + 1) * s.count]
+                .iter()
+                .map(|x| x * x)
+                .sum::<f64>();
+        }
+    }
+    let ratio = |e: f64, t: f64| (e / t.max(1e-300)).sqrt();
+    let joint = |(a, name): (usize, &String)| JointError {
+        joint: name.clone(),
+        rms: (sums[a] / part.used[a].max(1.0)).sqrt(),
+        relative_error: ratio(sums[a], part.energy[a]),
+    };
+    Some(Errors {
+        relative_error: ratio(sums.iter().sum(), part.energy.iter().sum()),
+        joints: joints.iter().enumerate().map(joint).collect(),
+    })
+}
+
+impl Merged {
+    /// `merged.json`.
+    pub fn json(&self, plant: &Plant) -> Value {
+        let rows = |m: &Mat<f64>| -> Vec<Vec<f64>> {
+            let row = |i: usize| (0..m.ncols()).map(|j| m[(i, j)]).collect();
+            (0..m.nrows()).map(row).collect()
+        };
+        let pair = |k: usize| {
+            let of = |p: usize| self.errors[p][k].as_ref().map(|e| e.relative_error);
+            json!({ "fit": of(0), "holdout": of(1) })
+        };
+        json!({
+            "robot": plant.name(),
+            "robot_hash": plant.robot().hash,
+            "joints": plant.actuators().iter().map(|j| j.name.as_str()).collect::<Vec<_>>(),
+            "records": { "fit": self.records[0], "holdout": self.records[1] },
+            "parameters": plant.parameters().iter().enumerate().map(|(u, p)| json!({
+                "name": p.name, "unit": p.unit, "value": self.phi[u], "std": self.phi_std[u], "nominal": p.value,
+            })).collect::<Vec<_>>(),
+            "base_parameters": (0..self.base.count()).map(|a| json!({
+                "name": self.base.name(a), "combination": self.base.combination(a),
+                "value": self.pi_consistent[a], "unconstrained": self.pi[a], "std": self.std[a],
+            })).collect::<Vec<_>>(),
+            "base_covariance": rows(&self.covariance),
+            "residual_covariance": rows(&self.residual_covariance),
+            "condition_number": { "weighted": self.condition },
+            "variance_inflation": self.inflation,
+            "prior": { "strength": self.prior_strength, "cross_validation": self.trials },
+            "physically_consistent": self.consistent,
+            "essential_parameters": { "count": self.essential.kept.len() },
+            "relative_error": { "nominal": pair(0), "model": pair(1) },
+            "validation": { "fit": self.errors[0][1], "holdout": self.errors[1][1] },
+            "warnings": self.warnings,
+        })
+    }
+}

@@ -1,0 +1,171 @@
+//! Condensed records: the same estimate as from the records, in any order and grouping.
+
+use crate::common::rehearse;
+use crate::common::shared::shared;
+use excite::Plant;
+use excite::identify::{Factor, Merged, Method, Settings, condense, identify, merge};
+use excite::log::{Experiment, Purpose, Record};
+use excite::robot::JointTerm;
+use excite::simulate::{Effects, Sensors, measure, simulate, to_record};
+use std::path::Path;
+
+fn plant() -> Plant {
+    let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
+    Plant::load("planar2").unwrap().with_terms(&terms)
+}
+
+/// Three runs at different speeds, the last one only predicted.
+fn records(plant: &Plant) -> Vec<Record> {
+    let motion = rehearse::motion("planar2");
+    let run = |(k, period): (usize, f64)| {
+        let motion = rehearse::within(&motion, period);
+        let settings = rehearse::simulation(Effects::default());
+        let run = simulate(plant, &motion, 3, &settings, &|_| {}).unwrap();
+        let sensors = Sensors::new(plant, 1.0).0;
+        let measured = measure(&run, &sensors, &settings.effects, k as u64);
+        let purpose = if k == 2 {
+            Purpose::Holdout
+        } else {
+            Purpose::Fit
+        };
+        to_record(&run, &measured, purpose, period)
+    };
+    [5.0, 6.5, 5.7].into_iter().enumerate().map(run).collect()
+}
+
+fn settings(method: Method) -> Settings {
+    let mut s = Settings {
+        method,
+        ..Settings::default()
+    };
+    s.signals.cutoff = Some(15.0);
+    s
+}
+
+fn of(plant: &Plant, records: &[Record]) -> Factor {
+    let settings = settings(Method::Wls);
+    condense(plant, "planar2", None, records, &settings).unwrap()
+}
+
+/// Through the bytes of files.
+fn merged(plant: &Plant, all: &[&Factor], settings: &Settings) -> Merged {
+    let read = |f: &&Factor| {
+        let bytes = f.to_bytes().unwrap();
+        Factor::from_bytes(&bytes, Path::new("a.factor")).unwrap()
+    };
+    merge(plant, all.iter().map(read).collect(), settings).unwrap()
+}
+
+fn off(a: &[f64], b: &[f64]) -> f64 {
+    let size = b.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let pairs = a.iter().zip(b);
+    pairs.map(|(x, y)| (x - y).abs() / size).fold(0.0, f64::max)
+}
+
+#[test]
+fn merged_factors_give_what_all_records_give() {
+    let plant = plant();
+    let records = records(&plant);
+    let [a, b] = [0, 1].map(|k| of(&plant, &records[k..=k]));
+    // a holdout record comes with one for the fit
+    let c = of(&plant, &records[1..]);
+    let all = of(&plant, &records);
+    for method in [Method::Wls, Method::Ols] {
+        let settings = settings(method);
+        let whole = identify(&plant, &records, &settings).unwrap();
+        let parts = merged(&plant, &[&a, &c], &settings);
+        let one = merged(&plant, &[&all], &settings);
+        let turned = merged(&plant, &[&b, &a], &settings);
+        for m in [&parts, &one, &turned] {
+            println!(
+                "{method:?}: base parameters off by {:.1e}, standard ones by {:.1e}, inflation {} {}",
+                off(&m.pi, &whole.pi),
+                off(&m.phi, &whole.phi),
+                m.inflation,
+                whole.inflation
+            );
+            assert!(off(&m.pi, &whole.pi) < 1e-10);
+            // what only the prior knows is as good as the solver of the bodies
+            let sure = m.phi.iter().zip(&one.phi).zip(&one.phi_std);
+            let sure = sure
+                .map(|((x, y), s)| (x - y).abs() / s)
+                .fold(0.0, f64::max);
+            println!(
+                "of one factor: {:.1e}, {sure:.1e} of their standard deviations",
+                off(&m.phi, &one.phi)
+            );
+            assert!(off(&m.pi, &one.pi) < 1e-10 && sure < 1e-5);
+            assert_eq!(m.prior_strength, one.prior_strength);
+            // the variance through correlated residuals alone is estimated otherwise
+            for ((x, y), s) in m.phi.iter().zip(&whole.phi).zip(&whole.phi_std) {
+                assert!((x - y).abs() < 0.3 * s, "{x} {y} {s}");
+            }
+        }
+        let covariance = |m: &faer::Mat<f64>| -> Vec<f64> { (0..2).map(|i| m[(i, i)]).collect() };
+        let [x, y] = [&parts.residual_covariance, &whole.residual_covariance].map(covariance);
+        assert!(off(&x, &y) < 1e-9);
+        let [nominal, model] = [0, 1].map(|k| parts.errors[1][k].as_ref().unwrap().relative_error);
+        assert!(model < nominal && model < 0.1, "{model} {nominal}");
+        assert!(turned.errors[1][0].is_none());
+    }
+}
+
+/// A real arm whose wrist is coupled: what goes with another joint is fitted aside.
+#[test]
+fn a_real_experiment_as_a_whole() {
+    let Some(file) = shared("data/tx40/experiment.toml") else {
+        return;
+    };
+    let e = Experiment::read(file).unwrap();
+    let settings = settings(Method::Wls);
+    let whole = identify(&e.plant, &e.records, &settings).unwrap();
+    let factor = condense(&e.plant, &e.spec, None, &e.records, &settings).unwrap();
+    let m = merged(&e.plant, &[&factor], &settings);
+    println!("base parameters off by {:.1e}", off(&m.pi, &whole.pi));
+    assert!(off(&m.pi, &whole.pi) < 1e-10);
+    let kinds = m.warnings.iter().map(|w| w.kind);
+    assert!(
+        kinds
+            .clone()
+            .any(|k| k == excite::WarningKind::JointsCoupled)
+    );
+    let [holdout, theirs] =
+        [&m.errors[1][1], &whole.validation.holdout].map(|e| e.as_ref().unwrap().relative_error);
+    assert!(
+        (holdout - theirs).abs() < 0.01 * theirs,
+        "{holdout} {theirs}"
+    );
+}
+
+#[test]
+fn what_does_not_add_or_is_damaged_is_refused() {
+    let plant = plant();
+    let records = records(&plant);
+    let a = of(&plant, &records[..1]);
+    let mut other = settings(Method::Wls);
+    other.signals.cutoff = Some(20.0);
+    let b = condense(&plant, "planar2", None, &records[1..2], &other).unwrap();
+    let error = a.clone().add(b).unwrap_err().to_string();
+    assert!(error.contains("--cutoff"), "{error}");
+    let scara = Plant::load("scara").unwrap();
+    let error = merge(&scara, vec![a.clone()], &other)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("another robot"), "{error}");
+    let error = merge(&plant, vec![a.clone()], &settings(Method::Robust)).unwrap_err();
+    assert!(error.to_string().contains("ols and wls"));
+    assert!(merge(&plant, Vec::new(), &other).is_err());
+    let bytes = a.to_bytes().unwrap();
+    let file = Path::new("x");
+    for cut in [0, 5, 40, bytes.len() / 2, bytes.len() - 1] {
+        assert!(Factor::from_bytes(&bytes[..cut], file).is_err());
+    }
+    // whatever stands in the header, nothing panics
+    for k in (16..bytes.len().min(1500)).step_by(5) {
+        let mut wrong = bytes.clone();
+        wrong[k] ^= 1 << (k % 7);
+        if let Ok(f) = Factor::from_bytes(&wrong, file) {
+            let _ = merge(&plant, vec![f], &settings(Method::Wls));
+        }
+    }
+}
