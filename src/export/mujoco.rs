@@ -5,10 +5,12 @@
 //! `b = 1 / timestep`, it is that of `q̇` down to `q̈ / b`. A constant torque is a spring so far away that its force
 //! does not change.
 
-mod joint;
+pub(super) mod joint;
 
 use super::element::{Element, Form, Kind};
-use super::{Format, LEAST, Model, Part, bounded, escape, possible, remark, xml_comment};
+use super::{
+    Format, LEAST, Model, Part, bounded, breakaway, escape, possible, remark, xml_comment,
+};
 use crate::error::Result;
 use crate::plant::Plant;
 use crate::robot::{Body, Inertia, JointTerm, Motion, Robot};
@@ -59,6 +61,7 @@ impl Format for Mujoco {
         let parts = Parts::of(model);
         lines.extend(parts.versions());
         lines.extend(parts.left_out(model.robot));
+        lines.extend(breakaway(model.robot));
         Ok(format!(
             "{}{}",
             xml_comment(&lines),
@@ -93,7 +96,7 @@ fn free_name(robot: &Robot, mut name: String) -> String {
 
 /// A body that MuJoCo takes: it refuses bodies without mass or with a principal moment of zero, and compares moments
 /// without tolerance. One without mass becomes a milligram of a millimetre, a point or thin rod 0.03 mm thick.
-fn solid(inertia: &Inertia) -> Inertia {
+pub(super) fn solid(inertia: &Inertia) -> Inertia {
     let able = possible(inertia);
     match able.mass() == 0.0 {
         true => bounded(
@@ -427,7 +430,7 @@ impl<'a> Parts<'a> {
 }
 
 /// Joints that follow others.
-fn followers(robot: &Robot, out: &mut String) {
+pub(super) fn followers(robot: &Robot, out: &mut String) {
     let followers: Vec<&Body> = robot
         .bodies
         .iter()

@@ -16,6 +16,7 @@
 //! 6. `validation`: residuals on fit and holdout records.
 
 pub(crate) mod aside;
+mod breakaway;
 pub(crate) mod consistent;
 pub(crate) mod cross_validation;
 pub(crate) mod doubts;
@@ -41,6 +42,7 @@ pub(crate) mod uncertainty;
 pub(crate) mod validation;
 pub(crate) mod weights;
 
+pub use breakaway::Breakaway;
 pub use cross_validation::Trial;
 pub use essential::Essential;
 pub use identification::Identification;
@@ -81,6 +83,18 @@ use normal::Normal;
 /// # Errors
 /// No record for the fit, settings that cannot be, records that carry an unknown payload.
 pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Result<Identification> {
+    if breakaway::asked(plant).is_empty() {
+        return linear_part(plant, records, settings);
+    }
+    let found = breakaway::find(plant, records, settings)?;
+    let plant = breakaway::with(plant, &found.all);
+    let mut id = linear_part(&plant, records, settings)?;
+    found.carry(&plant, &mut id);
+    Ok(id)
+}
+
+/// All that is linear in its parameters, breakaway friction being known.
+fn linear_part(plant: &Plant, records: &[Record], settings: &Settings) -> Result<Identification> {
     let mut warnings = plant.warnings().to_vec();
     let records = equations::usable(records, &mut warnings)?;
     let settings = equations::one_filter(&records, settings);
@@ -117,6 +131,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         margin: standard.margin,
         consistent: standard.consistent,
         outliers: estimate.outliers,
+        breakaway: Vec::new(),
         prepared: equations.prepared,
         essential,
         validation,

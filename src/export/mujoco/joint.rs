@@ -7,28 +7,28 @@ const FAR: f64 = 1e-6;
 
 /// What stands on a joint.
 #[derive(Debug, Clone, Default)]
-pub(super) struct OnJoint {
-    pub(super) armature: f64,
+pub(in crate::export) struct OnJoint {
+    pub(in crate::export) armature: f64,
     /// of `q̇`, `q̇ |q̇|`, `q̇³`
-    pub(super) damping: [f64; 3],
-    pub(super) coulomb: f64,
+    pub(in crate::export) damping: [f64; 3],
+    pub(in crate::export) coulomb: f64,
     /// of `1`, `q`, `q²`, `q³`
-    pub(super) spring: [f64; 4],
+    pub(in crate::export) spring: [f64; 4],
     /// stiffness, its third power, damping; of a spring that the file states
-    pub(super) twist: Option<[f64; 3]>,
-    pub(super) gain: f64,
+    pub(in crate::export) twist: Option<[f64; 3]>,
+    pub(in crate::export) gain: f64,
     /// s
-    pub(super) delay: f64,
+    pub(in crate::export) delay: f64,
 }
 
 impl OnJoint {
     /// Whether its spring has no position of rest, which MuJoCo's have.
-    pub(super) fn never_rests(&self) -> bool {
+    pub(in crate::export) fn never_rests(&self) -> bool {
         self.spring != [0.0; 4] && spring(self.spring).is_none()
     }
 
     /// Its attributes in the file.
-    pub(super) fn attributes(&self) -> String {
+    pub(in crate::export) fn attributes(&self) -> String {
         let mut out = String::new();
         let used = |x: &[f64]| x.iter().rposition(|v| *v != 0.0).map_or(0, |i| i + 1);
         let list = |x: &[f64]| -> String {
