@@ -147,12 +147,13 @@ fn state_torque<'a>(
     }
 }
 
-/// Sum of the joint terms of the nominal model: armature, friction, offset.
+/// Sum of the joint terms of the nominal model: armature, friction, offset, breakaway.
 #[doc(hidden)]
 pub fn joint_torque(joint: &Joint, state: [f64; 3]) -> f64 {
-    JointTerm::ALL
+    let terms: f64 = JointTerm::ALL
         .into_iter()
         .zip(joint.terms)
         .map(|(term, value)| value * term_factor(term, state))
-        .sum()
+        .sum();
+    terms + joint.stribeck.torque(state[1])
 }

@@ -36,15 +36,12 @@ pub fn condense<'py>(
     atmosphere: f64,
 ) -> PyResult<(Bound<'py, PyBytes>, Notices)> {
     let core = experiment.core.clone();
-    let settings = identification::Settings {
-        signals: signals::Settings {
-            cutoff,
-            average,
-            measured_rates: !derive,
-            ..Default::default()
-        },
-        ..Default::default()
-    };
+    let mut settings = identification::Settings::default();
+    settings.signals = signals::Settings::default().with(|set| {
+        set.cutoff = cutoff;
+        set.average = average;
+        set.measured_rates = !derive;
+    });
     let (bytes, warnings) = simply(py, move |_| {
         let core = Experiment::pressed(core, atmosphere)?;
         let mut notes = excite::survey::check(&core.plant, &core.records)?;
@@ -83,12 +80,10 @@ pub fn merge(
     identify: Option<Vec<String>>,
 ) -> PyResult<Report> {
     let core = plant.core.clone();
-    let settings = identification::Settings {
-        method: named("method", &method)?,
-        consistency: named("consistency", &consistency)?,
-        prior_strength: prior,
-        ..Default::default()
-    };
+    let mut settings = identification::Settings::default();
+    settings.method = named("method", &method)?;
+    settings.consistency = named("consistency", &consistency)?;
+    settings.prior_strength = prior;
     simply(py, move |_| {
         // said when the records were condensed
         let mut said = Vec::new();

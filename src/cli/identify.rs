@@ -6,7 +6,7 @@ use excite::identify::page;
 use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
 use excite::log::Experiment;
 use excite::robot::{JointTerm, Prior};
-use excite::{Error, Plant, Result, Warning, WarningKind};
+use excite::{Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -64,8 +64,8 @@ pub struct Args {
     #[arg(long)]
     derive: bool,
     /// Joint columns beside the ten of each link, for all joints: armature, viscous, coulomb,
-    /// offset, or none [default: as in the robot file; viscous, coulomb and offset where it lists
-    /// none for any joint]
+    /// offset, stribeck (breakaway friction and its speed; beside coulomb), or none; of a parallel robot for all actuators [default: as in the robot file; viscous,
+    /// coulomb and offset where that of a serial one lists none for any joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
     /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
@@ -117,6 +117,10 @@ pub fn run(args: Args) -> Result<()> {
     let mut robot = plant.with_values(&id.phi);
     // what is written comes from measurements, whatever the nominal values came from
     robot.prior = Prior::Identified;
+    for b in &id.breakaway {
+        let own = &mut robot.joints[plant.actuated()[b.actuator]].stribeck;
+        (own.force, own.velocity) = (b.force, b.velocity);
+    }
     let model = Model {
         plant,
         robot: &robot,
@@ -155,17 +159,22 @@ pub fn run(args: Args) -> Result<()> {
 /// The joint columns: those asked for, those of the file, or the usual ones where it lists none.
 ///
 /// # Errors
-/// A name that there is not; terms of a parallel robot.
+/// A name that there is not.
 pub fn columns(plant: Plant, asked: Option<&[String]>, notes: &mut Vec<Warning>) -> Result<Plant> {
+    // breakaway friction is no column
+    let breakaway = asked.map(|names| names.iter().any(|n| n == "stribeck"));
+    let linear = asked.map(|names| -> Vec<String> {
+        names.iter().filter(|n| *n != "stribeck").cloned().collect()
+    });
+    let plant = match breakaway {
+        Some(fit) => plant.fitting_stribeck(fit),
+        None => plant,
+    };
+    let asked = linear.as_deref();
     let terms = super::terms(asked.unwrap_or_default())?;
-    if plant.closed() {
-        return match asked {
-            Some(_) => Err(Error::Argument(
-                "--identify is for serial robots; list the terms of a parallel one in its file"
-                    .into(),
-            )),
-            None => Ok(plant),
-        };
+    // the file of a parallel robot says what its unknowns are; those of its actuators can be chosen
+    if plant.closed() && asked.is_none() {
+        return Ok(plant);
     }
     let none = plant
         .actuators()

@@ -29,7 +29,7 @@ fn remedy(robot: &Robot, j: usize, derate: f64) -> String {
         Motion::Revolute => "N m",
         Motion::Prismatic => "N",
     };
-    let coulomb = joint.terms[JointTerm::Coulomb as usize].abs();
+    let coulomb = joint.dry();
     let followers: Vec<&str> = robot
         .bodies
         .iter()
@@ -102,10 +102,7 @@ impl TorqueLimits {
             room: robot
                 .joints
                 .iter()
-                .map(|j| {
-                    let coulomb = j.terms[JointTerm::Coulomb as usize].abs();
-                    j.limits.effort * derate * (1.0 - BETWEEN) - coulomb
-                })
+                .map(|j| j.limits.effort * derate * (1.0 - BETWEEN) - j.dry())
                 .collect(),
         }
     }

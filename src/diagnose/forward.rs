@@ -221,9 +221,9 @@ fn run(
     let mut dynamics = Dynamics::new(plant, bodies, armature, robot.gravity);
     let viscous = DVector::from_fn(n, |j, _| robot.joints[j].terms[1]);
     let offset = DVector::from_fn(n, |j, _| robot.joints[j].terms[3]);
-    let dry: Vec<usize> = (0..n).filter(|j| robot.joints[*j].terms[2] > 0.0).collect();
-    let coulomb: Vec<f64> = dry.iter().map(|j| robot.joints[*j].terms[2]).collect();
-    let slack: Vec<f64> = coulomb.iter().map(|f| -f).collect();
+    let dry: Vec<usize> = (0..n)
+        .filter(|j| robot.joints[*j].terms[2].max(0.0) + robot.joints[*j].stribeck.force > 0.0)
+        .collect();
 
     let (h, omega) = (r.dt, TAU * super::controller::BANDWIDTH);
     let at = |rows: &[f64], i: usize| DVector::from_fn(m, |c, _| rows[c * r.count + i]);
@@ -291,6 +291,12 @@ fn run(
         let free = left.solve(&(&terms.mass * &ed + (force - opposed) * h));
         let rows = DMatrix::from_fn(dry.len(), m, |d, c| terms.d[(dry[d], c)]);
         let spread = left.solve(&rows.transpose()) * h;
+        let now: DVector<f64> = &terms.d * (&v + &ed);
+        let coulomb: Vec<f64> = dry
+            .iter()
+            .map(|&j| robot.joints[j].terms[2].max(0.0) + robot.joints[j].stribeck.level(now[j]))
+            .collect();
+        let slack: Vec<f64> = coulomb.iter().map(|f| -f).collect();
         let friction = hold(
             &(&rows * &spread),
             &(&rows * (&v + &free)),

@@ -107,7 +107,8 @@ fn terms(file: &mut Table, mechanism: &Mechanism, robot: &Robot) {
         names.iter().for_each(|n| drop(all.remove(*n)));
     }
     for (j, joint) in robot.joints.iter().enumerate() {
-        let has_terms = joint.terms != [0.0; 4] || joint.identify.contains(&true);
+        let has_terms =
+            joint.terms != [0.0; 4] || joint.stribeck.force > 0.0 || joint.identify.contains(&true);
         let platform = mechanism.task.names().contains(&joint.name.as_str());
         if platform || !(has_terms || mechanism.actuated.contains(&j)) {
             continue;
@@ -125,7 +126,12 @@ fn terms(file: &mut Table, mechanism: &Mechanism, robot: &Robot) {
             });
             list.unwrap_or_default()
         });
+        let own = joint.stribeck;
         if let Some(table) = tables(file, "joint").into_iter().nth(k) {
+            if own.force > 0.0 {
+                table.insert("stribeck".into(), own.force.into());
+                table.insert("stribeck_velocity".into(), own.velocity.into());
+            }
             for (name, value) in names.iter().zip(joint.terms) {
                 table.insert(name.to_string(), value.into());
             }

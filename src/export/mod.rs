@@ -4,6 +4,7 @@
 //! |---|---|---|---|
 //! | `robot.urdf` | [`urdf`] | tree, inertia, limits, viscous and Coulomb friction | all |
 //! | `robot.xml` | `mujoco` | the same for MuJoCo, rotor inertia, gravity, springs, drives | serial |
+//! | `robot.xml` | `closed` | the same with loops as equality constraints | parallel |
 //! | `effects.py` | `effects` | what MuJoCo has no element for, as functions of state and time step | serial |
 //! | `robot.toml` | `robot_toml`, [`mechanism`] | what the other commands read, geometry and loops included | all |
 //!
@@ -15,6 +16,7 @@
 //! has and a format cannot hold stands in it as a comment ([`Remark`]). The bodies that are written can
 //! exist: masses are positive and principal moments fulfil the triangle inequality ([`possible`]).
 
+mod closed;
 pub(crate) mod effects;
 pub(crate) mod element;
 pub(crate) mod isaac_lab;
@@ -110,9 +112,10 @@ pub trait Format: Sync {
 
 /// All formats.
 #[doc(hidden)]
-pub const FORMATS: [&dyn Format; 4] = [
+pub const FORMATS: [&dyn Format; 5] = [
     &urdf::Urdf,
     &mujoco::Mujoco,
+    &closed::Closed,
     &effects::Effects,
     &robot_toml::RobotToml,
 ];
@@ -148,6 +151,19 @@ pub fn further(names: &[String], plant: &Plant) -> Result<Vec<&'static dyn Forma
     names.iter().map(one).collect()
 }
 
+/// Breakaway friction of the model, which only `robot.toml` holds, in words.
+fn breakaway(robot: &Robot) -> Vec<String> {
+    let sticks = robot.joints.iter().filter(|j| j.stribeck.force > 0.0);
+    sticks
+        .map(|j| {
+            format!(
+                "Breakaway friction of {} on {}, falling to 1/e at {}, is not written: there is no element for it",
+                j.stribeck.force, j.name, j.stribeck.velocity
+            )
+        })
+        .collect()
+}
+
 /// Names of the files that a robot of this kind may be written to.
 pub fn files(plant: &Plant) -> Vec<&'static str> {
     let held = FORMATS.iter().filter(|f| f.holds(plant));
@@ -157,7 +173,9 @@ pub fn files(plant: &Plant) -> Vec<&'static str> {
 /// Names of all files.
 #[doc(hidden)]
 pub fn all() -> Vec<&'static str> {
-    FORMATS.iter().map(|f| f.file()).collect()
+    let mut all: Vec<&str> = FORMATS.iter().map(|f| f.file()).collect();
+    all.dedup();
+    all
 }
 
 /// Names of the files that a model needs.

@@ -5,12 +5,14 @@
 //! `b = 1 / timestep`, it is that of `q̇` down to `q̈ / b`. A constant torque is a spring so far away that its force
 //! does not change.
 
-mod joint;
+pub(super) mod joint;
 
 pub(super) use joint::{OnJoint, spring};
 
 use super::element::{Element, Form, Kind};
-use super::{Format, LEAST, Model, Part, bounded, escape, possible, remark, xml_comment};
+use super::{
+    Format, LEAST, Model, Part, bounded, breakaway, escape, possible, remark, xml_comment,
+};
 use crate::error::Result;
 use crate::plant::Plant;
 use crate::robot::{Body, Inertia, JointTerm, Motion, Robot};
@@ -65,6 +67,7 @@ impl Format for Mujoco {
         let parts = Parts::of(model);
         lines.extend(parts.versions());
         lines.extend(parts.left_out(model.robot));
+        lines.extend(breakaway(model.robot));
         Ok(format!(
             "{}{}",
             xml_comment(&lines),
@@ -444,7 +447,7 @@ impl<'a> Parts<'a> {
 }
 
 /// Joints that follow others.
-fn followers(robot: &Robot, out: &mut String) {
+pub(super) fn followers(robot: &Robot, out: &mut String) {
     let followers: Vec<&Body> = robot
         .bodies
         .iter()

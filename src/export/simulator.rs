@@ -1,5 +1,6 @@
 //! Which of the files for MuJoCo holds what.
 
+use super::closed::Closed;
 use super::element::{Element, FUNCTIONS, Form};
 use super::mujoco::Mujoco;
 use super::{Format, Part, Remark};
@@ -37,7 +38,11 @@ impl Remark {
 /// How the files for MuJoCo hold something.
 pub fn in_mujoco(plant: &Plant, held: Option<Part>, element: Option<&Element>) -> Form {
     if !Mujoco.holds(plant) {
-        return Form::None;
+        // the file of a closed chain has its values and no element beside them
+        return match held {
+            Some(_) if Closed.holds(plant) => Form::Native,
+            _ => Form::None,
+        };
     }
     if held.is_some_and(|part| Mujoco.has(part)) {
         return Form::Native;

@@ -151,6 +151,12 @@ impl Assessment {
         Ok(Assessment { load, ..self })
     }
 
+    /// Whether the trajectory was designed for a load.
+    pub(crate) fn meant_for_a_load(&self) -> bool {
+        let settings = self.excitation.as_ref().map(|e| &e.trajectory.settings);
+        settings.is_some_and(|s| s["for"] == "load")
+    }
+
     /// The condition number that stands for all, where a single one is printed: of the columns as they are for a tree; of
     /// unit columns for a closed chain, whose parameters differ by orders of magnitude in size. With its name.
     pub fn condition(&self) -> Option<(&'static str, f64)> {

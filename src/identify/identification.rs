@@ -1,5 +1,6 @@
 //! The result of [`identify`](super::identify).
 
+use super::breakaway::Breakaway;
 use super::cross_validation::Trial;
 use super::essential::Essential;
 use super::validation::Validation;
@@ -50,6 +51,8 @@ pub struct Identification {
     pub residual_covariance: Mat<f64>,
     /// share of the samples that the robust method set aside
     pub outliers: Option<f64>,
+    /// breakaway friction of the drives of which it was asked for and found
+    pub breakaway: Vec<Breakaway>,
     /// residuals record by record, of the base estimate and of the consistent one
     pub validation: Validation,
     /// records as they were used, in the order of the experiment; not serialised

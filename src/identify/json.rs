@@ -1,6 +1,6 @@
 //! `report.json` and `model.json`.
 
-use super::{Identification, Settings};
+use super::{Identification, Settings, breakaway};
 use crate::plant::{Column, Plant};
 use serde_json::{Value, json};
 
@@ -49,6 +49,18 @@ fn parameters(plant: &Plant, id: &Identification) -> Vec<Value> {
                 "kind": kind,
             }));
         }
+    }
+    for v in breakaway::values(plant, id) {
+        out.push(json!({
+            "name": v.name,
+            "value": number(v.value),
+            "std": number(v.std),
+            "relative_std_percent": percent(v.std, v.value),
+            "nominal": number(v.nominal),
+            "identifiability": "alone",
+            "unit": v.unit,
+            "kind": "joint",
+        }));
     }
     out
 }

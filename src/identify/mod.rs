@@ -18,6 +18,7 @@
 //! [`condense`](condense()) reduces records to triangular factors, from which [`merge`](merge()) identifies.
 
 pub(crate) mod aside;
+mod breakaway;
 pub(crate) mod condense;
 pub(crate) mod consistent;
 pub(crate) mod cross_validation;
@@ -46,6 +47,7 @@ pub(crate) mod uncertainty;
 pub(crate) mod validation;
 pub(crate) mod weights;
 
+pub use breakaway::Breakaway;
 pub use condense::{Factor, condense};
 pub use cross_validation::Trial;
 pub use essential::Essential;
@@ -88,6 +90,18 @@ use normal::Normal;
 /// # Errors
 /// No record for the fit, settings that cannot be, records that carry an unknown payload.
 pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Result<Identification> {
+    if breakaway::asked(plant).is_empty() {
+        return linear_part(plant, records, settings);
+    }
+    let found = breakaway::find(plant, records, settings)?;
+    let plant = breakaway::with(plant, &found.all);
+    let mut id = linear_part(&plant, records, settings)?;
+    found.carry(&plant, &mut id);
+    Ok(id)
+}
+
+/// All that is linear in its parameters, breakaway friction being known.
+fn linear_part(plant: &Plant, records: &[Record], settings: &Settings) -> Result<Identification> {
     let mut warnings = plant.warnings().to_vec();
     let records = equations::usable(records, &mut warnings)?;
     let settings = equations::one_filter(&records, settings);
@@ -125,6 +139,7 @@ pub fn identify(plant: &Plant, records: &[Record], settings: &Settings) -> Resul
         margin: standard.margin,
         consistent: standard.consistent,
         outliers: estimate.outliers,
+        breakaway: Vec::new(),
         prepared: equations.prepared,
         essential,
         validation,

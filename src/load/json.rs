@@ -80,6 +80,27 @@ pub fn json(found: &Identified) -> Value {
         b["standstill_velocity"] = json!(two.standstill);
         out["methods"]["two_step"] = b;
     }
+    let sure = known(found.load());
+    out["stream"] = one
+        .stream
+        .iter()
+        .map(|s| {
+            let number = |i: usize, x: f64| match sure[i] && x.is_finite() {
+                true => json!(x),
+                false => Value::Null,
+            };
+            let list = |range: std::ops::Range<usize>, x: &[f64; 10]| -> Vec<Value> {
+                range.map(|i| number(i, x[i])).collect()
+            };
+            json!({
+                "record": s.record,
+                "seconds": s.seconds,
+                "mass": { "value": number(0, s.values[0]), "std": number(0, s.stds[0]) },
+                "com": { "value": list(1..4, &s.values), "std": list(1..4, &s.stds) },
+                "inertia_com": { "value": list(4..10, &s.values), "std": list(4..10, &s.stds) },
+            })
+        })
+        .collect();
     out["residual_spread"] = json!(one.spreads);
     out["zeros"] = found
         .joints
@@ -104,7 +125,7 @@ pub fn json(found: &Identified) -> Value {
                     v
                 })
                 .collect();
-            json!({ "name": r.name, "loaded": r.loaded, "friction": friction,
+            json!({ "name": r.name, "loaded": r.loaded, "cutoff": r.cutoff.is_finite().then_some(r.cutoff), "friction": friction,
                     "residuals": r.residuals })
         })
         .collect();

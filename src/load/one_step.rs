@@ -4,6 +4,7 @@ mod fitted;
 mod reweight;
 mod solver;
 mod spectrum;
+mod stream;
 mod ten;
 mod zeros;
 
@@ -11,6 +12,7 @@ pub(super) use fitted::rms;
 pub use fitted::{Fitted, JointFriction};
 pub(super) use solver::Solver;
 pub(super) use spectrum::noise_like;
+pub use stream::Step;
 pub use zeros::Decision;
 
 use super::body::LoadBody;
@@ -42,6 +44,9 @@ pub struct OneStep {
     pub platform: Option<[f64; 10]>,
     /// constant forces of the actuators: shared by the records, drifting or free; empty with a single record
     pub zeros: Vec<Decision>,
+    /// the load as it became known, block by block of the loaded records
+    #[serde(skip)]
+    pub stream: Vec<Step>,
     /// condition number of the weighted columns of the load, scaled to unit length
     pub condition: f64,
     /// parameters of the load that cannot be told, with the reason
@@ -86,6 +91,8 @@ pub fn estimate(
     if settings.checked && known[0] {
         suspicion::negative(phi[0], covariance[(0, 0)].max(0.0).sqrt())?;
     }
+    let free = LoadBody::new(Inertia(phi), covariance.clone(), known, false)?;
+    let stream = stream::stream(&solver, &solution, &zeros, &spreads, &free)?;
     let load = LoadBody::new(Inertia(phi), covariance, known, settings.consistent && full)?;
     Ok(OneStep {
         warnings: suspicions
@@ -102,6 +109,7 @@ pub fn estimate(
             .collect(),
         platform: (empty && plant.closed()).then(|| ten::platform(&system, &solution)),
         zeros,
+        stream,
         load,
         spreads,
         condition,

@@ -1,6 +1,7 @@
 //! The report of a load.
 
 mod friction;
+mod stream;
 
 use super::Identified;
 use super::body::LoadBody;
@@ -83,6 +84,7 @@ pub fn html(found: &Identified) -> String {
     }
     sections.push(tiles(found));
     sections.push(methods(found));
+    sections.extend(stream::section(found));
     sections.push(torques(found));
     sections.push(speeds(found));
     if let Some(zeros) = friction::zeros(found) {

@@ -50,6 +50,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// Cut-off of the filter that torques and columns passed, Hz.
+    pub fn cutoff(&self) -> f64 {
+        self.filter.cutoff
+    }
+
     /// Stribeck factor `exp(−(v/v_s)²) sign(v)` of an actuator, filtered like everything else.
     pub fn stribeck(&self, a: usize, speed: f64) -> Vec<f64> {
         self.of_speed(a, |v| (-(v / speed).powi(2)).exp() * v.signum())

@@ -334,6 +334,7 @@ pub fn wrenches(
             if !own {
                 gamma[j * n + i] += viscous * qd + coulomb * sign + offset;
             }
+            gamma[j * n + i] += joint.stribeck.torque(qd);
         }
     }
     for (a, &j) in mechanism.actuated.iter().enumerate() {

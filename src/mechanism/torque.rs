@@ -45,6 +45,11 @@ impl Mechanism {
                     }
                 }
             }
+            if joint.stribeck.force != 0.0 {
+                for s in 0..x.count {
+                    gamma[j * x.count + s] += joint.stribeck.torque(motion.tree.at(j, s)[1]);
+                }
+            }
         }
         Ok(self.project(&motion, &gamma))
     }
@@ -70,8 +75,8 @@ impl Mechanism {
     }
 
     /// Actuator forces of the nominal model along the motion in the memory, in two halves: without
-    /// Coulomb friction, and the most that Coulomb friction of any sign can add,
-    /// `Σ_j |G_ja| F_c,j`. Each actuator-major.
+    /// dry friction, and the most that dry friction of any sign can add,
+    /// `Σ_j |G_ja| F_j`. Each actuator-major.
     pub fn smooth_force(&self, ws: &mut MechanismWorkspace, force: &mut Vec<f64>) {
         let MechanismWorkspace {
             tree,
@@ -100,7 +105,7 @@ impl Mechanism {
         let (smooth, friction) = force.split_at_mut(na * count);
         contract(&motion.g, torque, motion.tree.dof, na, count, smooth);
         for (j, joint) in self.robot.joints.iter().enumerate() {
-            let coulomb = joint.terms[JointTerm::Coulomb as usize].abs();
+            let coulomb = joint.dry();
             if coulomb == 0.0 {
                 continue;
             }

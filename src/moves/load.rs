@@ -119,8 +119,9 @@ pub(super) fn largest_rates(
         }
         let coulomb = joint.terms[JointTerm::Coulomb as usize];
         let smooth = |s: usize| {
-            let jump = coulomb * term_factor(JointTerm::Coulomb, x.at(a, s));
-            tau[a * x.count + s] - jump
+            let state = x.at(a, s);
+            let jump = coulomb * term_factor(JointTerm::Coulomb, state);
+            tau[a * x.count + s] - jump - joint.stribeck.torque(state[1])
         };
         let rates = (1..x.count).map(|s| ((smooth(s) - smooth(s - 1)) / step).abs());
         Some(rates.fold(0.0, f64::max))

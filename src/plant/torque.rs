@@ -90,6 +90,11 @@ impl Plant {
     fn known_terms(&self, x: &Samples) -> Vec<f64> {
         let mut tau = vec![0.0; x.dof * x.count];
         for (j, joint) in self.robot.joints.iter().enumerate() {
+            if joint.stribeck.force != 0.0 {
+                for s in 0..x.count {
+                    tau[j * x.count + s] += joint.stribeck.torque(x.qd[j * x.count + s]);
+                }
+            }
             for term in JointTerm::ALL {
                 let value = joint.terms[term as usize];
                 if joint.identify[term as usize] || value == 0.0 {

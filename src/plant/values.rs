@@ -2,7 +2,7 @@
 
 use super::{Column, Plant};
 use crate::robot::JointTerm;
-use crate::robot::{Inertia, Robot};
+use crate::robot::{Inertia, Robot, Stribeck};
 use std::sync::Arc;
 
 impl Plant {
@@ -68,6 +68,43 @@ impl Plant {
             scene: self.scene.clone(),
             ..other
         }
+    }
+
+    /// The same robot with other breakaway friction of some actuators.
+    pub(crate) fn with_stribeck(&self, all: &[(usize, Stribeck)]) -> Plant {
+        let set = |robot: &mut Robot| {
+            for (a, stribeck) in all {
+                robot.joints[self.actuated[*a]].stribeck = *stribeck;
+            }
+        };
+        let other: Plant = match self.mechanism.clone() {
+            None => {
+                let mut robot = self.robot.clone();
+                set(&mut robot);
+                robot.into()
+            }
+            Some(mechanism) => {
+                let mut mechanism = Arc::unwrap_or_clone(mechanism);
+                set(&mut mechanism.robot);
+                mechanism.into()
+            }
+        };
+        Plant {
+            collisions: self.collisions,
+            scene: self.scene.clone(),
+            ..other
+        }
+    }
+
+    /// The same robot with its breakaway friction among what `identify` estimates, or not, for every actuator.
+    pub fn fitting_stribeck(&self, fit: bool) -> Plant {
+        let joints = self.actuators();
+        let all: Vec<(usize, Stribeck)> = joints
+            .iter()
+            .enumerate()
+            .map(|(a, j)| (a, Stribeck { fit, ..j.stribeck }))
+            .collect();
+        self.with_stribeck(&all)
     }
 
     /// The same robot with fewer unknowns: of a closed chain the ten of the body that carries a load, and of every robot

@@ -15,6 +15,7 @@ pub(crate) mod inertia;
 pub(crate) mod meant;
 pub(crate) mod mjcf;
 mod parameter;
+mod stribeck;
 pub(crate) mod tool;
 pub(crate) mod urdf;
 mod velocity_by_position;
@@ -23,6 +24,7 @@ pub use inertia::Inertia;
 #[doc(hidden)]
 pub use meant::Placement;
 pub use parameter::{Column, Parameter};
+pub use stribeck::Stribeck;
 pub use tool::Tool;
 pub(crate) use velocity_by_position::Side;
 pub use velocity_by_position::VelocityByPosition;
@@ -212,6 +214,8 @@ pub struct Joint {
     /// values of armature, viscous, Coulomb and offset in the nominal model, in
     /// [`JointTerm::ALL`] order; always part of the torque
     pub terms: [f64; 4],
+    /// breakaway friction beside them, known
+    pub stribeck: Stribeck,
     /// which of them are unknowns with a column of their own
     pub identify: [bool; 4],
 }
@@ -266,8 +270,14 @@ impl Joint {
             continuous_torque: None,
             continuous_power: None,
             terms: [0.0; 4],
+            stribeck: Stribeck::default(),
             identify: [false; 4],
         }
+    }
+
+    /// The most that dry friction takes, whatever the speed: Coulomb and breakaway, N m or N.
+    pub fn dry(&self) -> f64 {
+        self.terms[JointTerm::Coulomb as usize].abs() + self.stribeck.force.abs()
     }
 }
 

@@ -80,10 +80,10 @@ impl<'a> Tracker<'a> {
             let coulomb = joint.terms[2];
             let qd = &moved.qd[a * count..(a + 1) * count];
             let slow = 0.02 * qd.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-            if coulomb != 0.0 && slow > 0.0 {
+            if joint.dry() != 0.0 && slow > 0.0 {
                 for (tau, &v) in ahead[a * count..].iter_mut().zip(qd) {
                     let sign = if v == 0.0 { 0.0 } else { v.signum() };
-                    *tau += coulomb * ((v / slow).tanh() - sign);
+                    *tau += (coulomb + joint.stribeck.level(v)) * ((v / slow).tanh() - sign);
                 }
             }
         }

@@ -18,6 +18,7 @@
 //! than freedoms.
 
 use super::effects::JointEffect;
+use crate::robot::Stribeck;
 use nalgebra::{DMatrix, DVector};
 
 /// State of the dry friction of one joint.
@@ -40,6 +41,8 @@ pub struct Friction {
     pub coulomb: f64,
     /// constant torque
     pub offset: f64,
+    /// breakaway of the nominal model
+    pub stribeck: Stribeck,
     /// the rest
     pub effect: JointEffect,
 }
@@ -48,6 +51,7 @@ impl Friction {
     /// Whether there is dry friction at all.
     pub fn is_dry(&self) -> bool {
         self.coulomb > 0.0
+            || self.stribeck.force > 0.0
             || self.effect.stribeck > 0.0
             || self.effect.load_friction > 0.0
             || self.effect.asymmetry != 0.0
@@ -58,10 +62,12 @@ impl Friction {
     pub fn dry(&self, positive: bool, v: f64, tau: f64) -> f64 {
         let e = &self.effect;
         let side = if positive { 0.5 } else { -0.5 };
-        let peak = match e.stribeck > 0.0 {
-            true => e.stribeck * (-(v / e.stribeck_velocity).powi(2)).exp(),
-            false => 0.0,
+        let more = Stribeck {
+            force: e.stribeck,
+            velocity: e.stribeck_velocity,
+            fit: false,
         };
+        let peak = self.stribeck.level(v) + more.level(v);
         (self.coulomb + side * e.asymmetry + peak + e.load_friction * tau.abs()).max(0.0)
     }
 

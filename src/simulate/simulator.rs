@@ -64,10 +64,12 @@ impl<'a> Simulator<'a> {
         let friction: Vec<Friction> = terms
             .iter()
             .zip(&actuator)
-            .map(|(t, a)| Friction {
+            .zip(&plant.robot().joints)
+            .map(|((t, a), joint)| Friction {
                 viscous: t[1],
                 coulomb: t[2],
                 offset: t[3],
+                stribeck: joint.stribeck,
                 effect: a.map_or_else(Default::default, |a| effects.joint(a)),
             })
             .collect();

@@ -5,7 +5,7 @@ use super::enclose::{Enclosed, Motion, enclose};
 use super::fourier::{Fourier, check};
 use super::jets::Norms;
 use crate::error::{Error, Result};
-use crate::robot::{Joint, JointTerm, Robot};
+use crate::robot::{Joint, Robot};
 
 /// What may be missing between samples, as a fraction of the limit.
 const TARGET: f64 = 0.002;
@@ -51,7 +51,7 @@ pub fn torque_certificate(
     let each = robot.joints.iter().zip(found);
     Ok(each
         .map(|(joint, found)| {
-            let coulomb = joint.terms[JointTerm::Coulomb as usize].abs();
+            let coulomb = joint.dry();
             let limit = Some(joint.limits.effort).filter(|l| l.is_finite());
             let value = found.highest + coulomb;
             TorqueBound {

@@ -58,6 +58,7 @@ pub fn joint(name: &str, motion: Motion) -> Joint {
         continuous_torque: None,
         continuous_power: None,
         terms: [0.0; 4],
+        stribeck: Default::default(),
         identify: [false; 4],
     }
 }

@@ -34,10 +34,7 @@ fn records(plant: &Plant) -> Vec<Record> {
 }
 
 fn settings(method: Method) -> Settings {
-    let mut s = Settings {
-        method,
-        ..Settings::default()
-    };
+    let mut s = Settings::default().with(|set| set.method = method);
     s.signals.cutoff = Some(15.0);
     s
 }

@@ -299,6 +299,49 @@ fn both_methods_are_exact_without_noise() {
     assert!(found.warnings.iter().any(|w| w.message.contains("nominal")));
 }
 
+/// The recursion ends where the fit of all rows ends, and knows more with every block.
+#[test]
+fn the_stream_ends_at_the_fit_of_all_rows() {
+    let truth = Truth {
+        load: Some(Inertia::from_quantities(&LOAD)),
+        stribeck: 15.0,
+        noise: 0.5,
+        ..Truth::default()
+    };
+    let found = hexapod(&truth, 100.0, 1000, 4, &Settings::default());
+    let one = &found.one_step;
+    let steps = &one.stream;
+    assert_eq!(
+        steps.len(),
+        12,
+        "a record that does not repeat comes in twelve blocks"
+    );
+    let (last, whole, std) = (steps.last().unwrap(), one.load.values(), one.load.stds());
+    for k in 0..10 {
+        let away = (last.values[k] - whole[k]).abs() / std[k];
+        // but for the mean over the walk of the constants, of which the stream takes one
+        assert!(away < 0.5, "{k}: {away} standard deviations");
+        assert!((last.stds[k] / std[k] - 1.0).abs() < 1e-6);
+    }
+    for pair in steps.windows(2) {
+        assert!(pair[1].seconds > pair[0].seconds);
+        assert!(
+            pair[1].stds[0] <= pair[0].stds[0] * 1.001,
+            "{:?}",
+            pair[1].stds
+        );
+    }
+    assert!(steps[0].stds[0] > 2.0 * last.stds[0]);
+    // both records, 10 s each
+    assert!((last.seconds - 20.0).abs() < 0.2, "{}", last.seconds);
+    let json = excite::load::json::json(&found);
+    let stream = json["stream"].as_array().unwrap();
+    assert_eq!(stream.len(), 12);
+    assert_eq!(stream[11]["mass"]["value"], last.values[0]);
+    let page = excite::load::page::html(&found);
+    assert!(page.contains("As it became known"));
+}
+
 #[test]
 fn stribeck_friction_and_noise_stay_within_the_targets() {
     let truth = Truth {

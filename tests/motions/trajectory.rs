@@ -22,6 +22,7 @@ fn joint(name: &str, motion: Motion, limits: Limits) -> Joint {
         continuous_torque: None,
         continuous_power: None,
         terms: [0.0; 4],
+        stribeck: Default::default(),
         identify: [false; 4],
     }
 }

@@ -53,7 +53,7 @@ fn opened(m: &Mechanism, balls: Vec<[(String, Vector3<f64>); 2]>) -> Mechanism {
 }
 
 /// Mechanisms in closed form, each beside the same one with loops.
-fn pairs() -> Vec<(Mechanism, Mechanism)> {
+pub(super) fn pairs() -> Vec<(Mechanism, Mechanism)> {
     let mut all = Vec::new();
     let robot = hexapod(&reference("sg").0);
     let m = robot.build().unwrap();

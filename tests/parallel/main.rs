@@ -7,6 +7,7 @@ mod design;
 mod files;
 mod identities;
 mod loops;
+mod mujoco;
 mod new_mechanism;
 mod questions;
 mod reference;

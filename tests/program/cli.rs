@@ -746,6 +746,13 @@ fn a_motion_for_a_load_states_its_accuracy() {
     );
     assert!(out.stdout.contains(&headline), "{headline}\n{}", out.stdout);
     assert_eq!(report["load"]["payload"]["mass"], 4.0);
+    assert_eq!(report["verdict"]["grade"], "worthwhile");
+    assert!(
+        report["verdict"]["text"]
+            .as_str()
+            .unwrap()
+            .contains("for a load")
+    );
     assert_eq!(report["load"]["limits_satisfied"], true);
     assert!(report["load"]["std"]["mass"].as_f64().unwrap() > 0.0);
     // a platform that does not turn tells no tensor
@@ -803,4 +810,65 @@ fn questions_that_mean_nothing_have_status_2() {
         &["--criterion"],
     );
     t.fails("design planar2 --for wings", 2, &["load"]);
+}
+
+#[test]
+fn a_new_parallel_robot_has_a_campaign() {
+    for name in ["hexapod", "h4", "delta"] {
+        let t = Test::new();
+        let out = t.run(&format!("new {name} --output machine"));
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        t.fails(
+            &format!("new {name} --output machine"),
+            1,
+            &["robot.toml", "--force"],
+        );
+        let text = std::fs::read_to_string(t.path().join("machine/robot.toml")).unwrap();
+        assert!(text.starts_with("# To be filled in"), "{text}");
+        assert_eq!(text.contains("piston"), name == "hexapod");
+        // the same machine as the bundled one, but for its comments
+        let ours: toml::Table = toml::from_str(&text).unwrap();
+        let bundled = excite::mechanism::bundled::find(name).unwrap();
+        assert_eq!(ours, toml::from_str::<toml::Table>(bundled.toml).unwrap());
+        let design = "design machine/robot.toml --for load --starts 1 --harmonics 4 --no-collision --output d";
+        let out = t.run(design);
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        for (log, more) in [
+            ("empty", ""),
+            ("holdout", " --seed 2"),
+            (
+                "loaded",
+                " --seed 3 --payload 1,0,0,0.02,0.001,0,0,0.001,0,0.001",
+            ),
+        ] {
+            let out = t.run(&format!("simulate machine/robot.toml d/trajectory.json --periods 2 --rate 200 --output machine/{log}.csv{more}"));
+            assert_eq!(out.status, 0, "{}", out.stderr);
+        }
+        // every command reads it
+        let out = t.run("load machine/experiment.toml --output l");
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let out =
+            t.run("identify machine/experiment.toml --identify viscous,coulomb,offset --output i");
+        assert_eq!(out.status, 0, "{}", out.stderr);
+        let report = t.json("i/report.json");
+        let names: Vec<&str> = report["parameters"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|p| p["name"].as_str().unwrap())
+            .collect();
+        assert!(names.iter().any(|n| n.ends_with(".offset")), "{names:?}");
+        let less = t.run("identify machine/experiment.toml --identify none --output n");
+        assert_eq!(less.status, 0, "{}", less.stderr);
+        let report = t.json("n/report.json");
+        let terms = report["parameters"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|p| p["kind"] == "joint")
+            .count();
+        assert_eq!(terms, 0);
+    }
+    let t = Test::new();
+    t.fails("new hexapod --output robot.toml", 2, &["folder"]);
 }

@@ -2,7 +2,7 @@
 
 use super::{KNOWN, clearance};
 use crate::collision::build::in_words;
-use crate::identifiability::{Assessment, Excitation, Platform};
+use crate::identifiability::{Assessment, Excitation, LoadAccuracy, Platform};
 use crate::mechanism::PoseKind;
 use crate::plant::PairClearance;
 use crate::report::format::{count, percent, significant, unit_of, with_unit};
@@ -139,6 +139,9 @@ pub fn verdict(a: &Assessment) -> Verdict {
         ),
         None => "the robot states no limits".into(),
     };
+    if let Some(l) = a.load.as_ref().filter(|_| a.meant_for_a_load()) {
+        return for_a_load(l, &limits, &unchecked);
+    }
     let (known, judged) = e.known(KNOWN);
     let lost = e
         .predictions
@@ -185,6 +188,35 @@ pub fn verdict(a: &Assessment) -> Verdict {
                 "Inside its limits, but most parameters stay uncertain: {facts}. {unchecked}"
             ),
         }
+    }
+}
+
+/// Uncertainty of the mass, at 95 %, up to which a motion for a load is worth running.
+const WEIGHED: f64 = 0.02;
+
+/// Verdict on a motion that is meant for a load: by how well it tells that.
+fn for_a_load(l: &LoadAccuracy, limits: &str, unchecked: &str) -> Verdict {
+    let [mass, com, tensor] = l.in_short(&l.shared);
+    let of = |x: Option<f64>, factor: f64, unit: &str| match x {
+        Some(x) => format!("to {}\u{a0}{unit}", significant(1.96 * factor * x, 2)),
+        None => "not at all".into(),
+    };
+    let relative = mass.map(|m| m / l.payload[0]);
+    let (grade, words) = match relative.is_some_and(|m| 1.96 * m <= WEIGHED) {
+        true => (Grade::Worthwhile, "and worth running for a load"),
+        false => (Grade::Weak, "but it hardly tells the load"),
+    };
+    Verdict {
+        grade,
+        text: format!(
+            "Inside its limits {words}: {limits}; of {} recorded {} empty and as long loaded it tells the mass {}, the centre of mass {} \
+             and the tensor {} (95\u{a0}%). {unchecked}",
+            with_unit(l.payload[0], 4, "kg"),
+            with_unit(l.seconds, 3, "s"),
+            of(relative, 100.0, "%"),
+            of(com, 1e3, "mm"),
+            of(tensor, 100.0, "%"),
+        ),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Base, standard and essential parameters, and the prior.
 
-use crate::identify::{Consistency, Identification, Settings};
+use crate::identify::{Consistency, Identification, Settings, breakaway};
 use crate::plant::{Column, Plant};
 use crate::report::format::{NBSP, percent, significant, unit};
 use crate::report::html::{self, Section};
@@ -67,7 +67,16 @@ pub(super) fn standard(plant: &Plant, id: &Identification) -> Section {
             .collect()
     };
     let head = ["parameter", "value", "std", "nominal", "unit"];
-    let joints = pick(true);
+    let mut joints = pick(true);
+    joints.extend(breakaway::values(plant, id).into_iter().map(|v| {
+        vec![
+            html! { (v.name) },
+            html! { (significant(v.value, 4)) },
+            html! { (significant(v.std, 2)) },
+            html! { (significant(v.nominal, 4)) },
+            html! { (unit(v.unit)) },
+        ]
+    }));
     Section::new(
         "Standard parameters",
         html! {

@@ -63,6 +63,9 @@ pub struct Fitted {
     pub name: String,
     /// whether it had the load
     pub loaded: bool,
+    /// cut-off of the filter that torques and columns passed, Hz; infinite where nothing was filtered
+    #[serde(skip)]
+    pub cutoff: f64,
     /// samples
     pub count: usize,
     /// times, s
@@ -151,6 +154,7 @@ pub fn fitted(
     Fitted {
         name: part.name.clone(),
         loaded: part.loaded,
+        cutoff: part.cutoff(),
         count: n,
         time: part.time.clone(),
         speed: part.speed.clone(),

@@ -72,7 +72,8 @@ impl<'a> Solver<'a> {
         self.friction(self.system.parts.len()) + a
     }
 
-    fn row(&self, p: usize, part: &Part, i: usize, to: &mut dyn FnMut(usize, f64)) {
+    /// Row `i` of a record: its columns with their factors.
+    pub fn row(&self, p: usize, part: &Part, i: usize, to: &mut dyn FnMut(usize, f64)) {
         let nd = self.system.deviations.len();
         for c in 0..nd {
             to(c, part.deviation[(i, c)]);
@@ -296,21 +297,24 @@ impl<'a> Solver<'a> {
     /// A breath of regularisation for columns that the motion does not tell apart, which changes the others by 1e-18 of
     /// themselves; and what is known of the size of Stribeck forces.
     fn regularise(&self, a: &mut Mat<f64>, rows: usize) {
-        let n = a.ncols();
-        let mut top = 0.0f64;
-        for c in 0..n {
-            top = top.max(a.col(c).norm_l2());
+        let norms: Vec<f64> = (0..a.ncols()).map(|c| a.col(c).norm_l2()).collect();
+        for (c, value) in self.ridge(&norms).into_iter().enumerate() {
+            a[(rows + c, c)] = value;
         }
-        for c in 0..n {
-            let norm = a.col(c).norm_l2();
-            a[(rows + c, c)] = 1e-9 * if norm > 0.0 { norm } else { top.max(1.0) };
-        }
+    }
+
+    /// The diagonal of that, from the norms of the weighted columns.
+    pub fn ridge(&self, norms: &[f64]) -> Vec<f64> {
+        let top = norms.iter().fold(1.0f64, |m, v| m.max(*v));
+        let breath = |norm: &f64| 1e-9 * if *norm > 0.0 { *norm } else { top };
+        let mut out: Vec<f64> = norms.iter().map(breath).collect();
         for p in 0..self.system.parts.len() {
             for (k, force) in self.breakaway.iter().enumerate() {
                 let c = self.friction(p) + EACH * k + 3;
-                a[(rows + c, c)] = a[(rows + c, c)].max(1.0 / force);
+                out[c] = out[c].max(1.0 / force);
             }
         }
+        out
     }
 
     /// First row and number of rows of every actuator in every record.

@@ -260,6 +260,7 @@ impl Head<'_> {
                 j.position_resolution = joint.position_resolution;
                 j.gear_ratio = joint.gear_ratio;
                 j.piston = joint.piston;
+                j.stribeck = joint.stribeck;
                 j.continuous_torque = joint.continuous_torque;
                 j.continuous_power = joint.continuous_power;
                 // what the model has moved into a body (lumped inertia) is no column any more

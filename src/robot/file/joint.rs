@@ -25,6 +25,8 @@ pub(crate) struct JointEntry {
     position_resolution: Option<Spanned<f64>>,
     gear_ratio: Option<Spanned<f64>>,
     piston: Option<Spanned<Vec<f64>>>,
+    stribeck: Option<Spanned<f64>>,
+    stribeck_velocity: Option<Spanned<f64>>,
     continuous_torque: Option<Spanned<f64>>,
     continuous_power: Option<Spanned<f64>>,
     armature: Option<Spanned<f64>>,
@@ -275,15 +277,41 @@ pub(crate) fn joint_values(
         }
         joint.terms[term as usize] = value;
     }
+    if let Some(force) = &entry.stribeck {
+        let (at, force) = (force.span().start, *force.get_ref());
+        if !(force >= 0.0 && force <= LARGEST) {
+            return Err(source.error(
+                at,
+                what,
+                format!("stribeck = {force:e} must be a friction of 0 or more, N m or N"),
+            ));
+        }
+        joint.stribeck.force = force;
+    }
+    if let Some(speed) = &entry.stribeck_velocity {
+        let (at, speed) = (speed.span().start, *speed.get_ref());
+        if !(speed > 1e-9 && speed <= LARGEST) {
+            return Err(source.error(
+                at,
+                what,
+                format!("stribeck_velocity = {speed:e} must be a speed above 0, rad/s or m/s"),
+            ));
+        }
+        joint.stribeck.velocity = speed;
+    }
     for term in &entry.identify {
         let name = term.get_ref();
+        if name == "stribeck" {
+            joint.stribeck.fit = true;
+            continue;
+        }
         let Some(known) = JointTerm::ALL.into_iter().find(|t| t.name() == name) else {
             let all = JointTerm::ALL.map(JointTerm::name);
             return Err(source.error(
                 term.span().start,
                 what,
                 format!(
-                    "identify has no term `{name}`; its terms are {}",
+                    "identify has no term `{name}`; its terms are {}, stribeck",
                     all.join(", ")
                 ),
             ));

@@ -1,7 +1,7 @@
 //! The commented `robot.toml` of `excite new`.
 
 use crate::robot::geometry::Obstacle;
-use crate::robot::{JointTerm, Motion, Prior, Robot, VelocityByPosition};
+use crate::robot::{JointTerm, Motion, Prior, Robot, Stribeck, VelocityByPosition};
 use crate::solid::Shape;
 use nalgebra::{Rotation3, Vector3};
 use std::fmt::Write as _;
@@ -136,15 +136,35 @@ pub(super) fn template(robot: &Robot, urdf: &str) -> String {
         );
         key(out, "coulomb", Some(coulomb), 0.0, torque);
         key(out, "offset", Some(offset), 0.0, torque);
+        let Stribeck {
+            force, velocity, ..
+        } = joint.stribeck;
+        key(
+            out,
+            "stribeck",
+            (force > 0.0).then_some(force),
+            1.0,
+            &format!(
+                "{torque}: breakaway beyond coulomb, stribeck exp(-(speed/stribeck_velocity)^2)"
+            ),
+        );
+        key(
+            out,
+            "stribeck_velocity",
+            (force > 0.0).then_some(velocity),
+            0.01,
+            &format!("{angle}/s"),
+        );
         let identify: Vec<String> = JointTerm::ALL
             .into_iter()
             .zip(joint.identify)
             .filter(|(_, wanted)| *wanted)
             .map(|(t, _)| quoted(t.name()))
+            .chain(joint.stribeck.fit.then(|| quoted("stribeck")))
             .collect();
         let _ = writeln!(
             out,
-            "identify = [{}]     # any of \"armature\", \"viscous\", \"coulomb\", \"offset\"",
+            "identify = [{}]     # any of \"armature\", \"viscous\", \"coulomb\", \"offset\", \"stribeck\"",
             identify.join(", ")
         );
     }

@@ -251,6 +251,7 @@ fn coordinate_of(
         position_resolution: None,
         gear_ratio: None,
         piston: None,
+        stribeck: Default::default(),
         continuous_torque: None,
         continuous_power: None,
         terms: [joint.armature, joint.damping, joint.friction, 0.0],
