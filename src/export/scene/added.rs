@@ -189,7 +189,7 @@ impl Work<'_> {
             }
         }
         let mut end = vec!["</body>".to_string()];
-        if placed(&inner) != "" {
+        if !placed(&inner).is_empty() {
             lines.push(format!("  <frame{}>", placed(&inner)));
             end.insert(0, "  </frame>".into());
         }

@@ -181,7 +181,7 @@ fn standing(node: &mut Node, notes: &mut Vec<String>) {
                 || j.tag == "joint" && matches!(j.own("type"), Some("free" | "ball"))
         };
         let keep =
-            !MAKERS.contains(&c.tag.as_str()) && !(c.tag == "body" && c.children.iter().any(free));
+            !(MAKERS.contains(&c.tag.as_str()) || c.tag == "body" && c.children.iter().any(free));
         if !keep {
             notes.push(format!("line {}: {}", c.line, Edits::called(c)));
         }
