@@ -214,7 +214,7 @@ impl Factor {
     ///
     /// # Errors
     /// Factors of other robots, columns or filters.
-    pub fn add(self, other: Factor) -> Result<Factor> {
+    pub fn with(self, other: Factor) -> Result<Factor> {
         let (a, b) = (&self.header, &other.header);
         let differ = |what: &str, remedy: &str| {
             Err(Error::Infeasible(format!(
@@ -243,7 +243,7 @@ impl Factor {
             .warnings
             .extend(other.header.warnings.iter().cloned());
         let mut folds = [Vec::new(), Vec::new()];
-        for p in 0..2 {
+        for (p, out) in folds.iter_mut().enumerate() {
             let (x, y) = (&self.header.parts[p], &other.header.parts[p]);
             let mut columns: Vec<[usize; 2]> =
                 x.columns.iter().chain(&y.columns).copied().collect();
@@ -262,7 +262,7 @@ impl Factor {
                 let of = |part: &Part, all: &[Mat<f64>]| all.get(f).map(|m| spread(part, m));
                 let both = [of(x, &self.folds[p]), of(y, &other.folds[p])];
                 let both: Vec<Mat<f64>> = both.into_iter().flatten().collect();
-                folds[p].push(linear::factor(&both));
+                out.push(linear::factor(&both));
             }
             let join = |x: &[f64], y: &[f64], f: fn(f64, f64) -> f64| -> Vec<f64> {
                 let at = |v: &[f64], k: usize| v.get(k).copied().unwrap_or(0.0);

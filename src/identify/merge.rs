@@ -73,7 +73,7 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
     let first = all.next().ok_or_else(|| {
         Error::Argument("no factor is named; make some with `excite condense`".into())
     })?;
-    let factor = all.try_fold(first, Factor::add)?;
+    let factor = all.try_fold(first, Factor::with)?;
     let base = plant.base()?;
     let header = &factor.header;
     let names: Vec<&str> = (0..base.count()).map(|k| base.name(k)).collect();

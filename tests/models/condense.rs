@@ -142,7 +142,7 @@ fn what_does_not_add_or_is_damaged_is_refused() {
     let mut other = settings(Method::Wls);
     other.signals.cutoff = Some(20.0);
     let b = condense(&plant, "planar2", None, &records[1..2], &other).unwrap();
-    let error = a.clone().add(b).unwrap_err().to_string();
+    let error = a.clone().with(b).unwrap_err().to_string();
     assert!(error.contains("--cutoff"), "{error}");
     let scara = Plant::load("scara").unwrap();
     let error = merge(&scara, vec![a.clone()], &other)

@@ -180,8 +180,8 @@ fn standing(node: &mut Node, notes: &mut Vec<String>) {
             j.tag == "freejoint"
                 || j.tag == "joint" && matches!(j.own("type"), Some("free" | "ball"))
         };
-        let made = MAKERS.contains(&c.tag.as_str());
-        let keep = !made && (c.tag != "body" || !c.children.iter().any(free));
+        let keep =
+            !(MAKERS.contains(&c.tag.as_str()) || c.tag == "body" && c.children.iter().any(free));
         if !keep {
             notes.push(format!("line {}: {}", c.line, Edits::called(c)));
         }
