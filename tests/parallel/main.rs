@@ -11,3 +11,4 @@ mod mujoco;
 mod new_mechanism;
 mod questions;
 mod reference;
+mod stribeck;

@@ -7,8 +7,11 @@ use crate::report::html::{self, Section};
 use crate::report::plot::{Axis, Colour, Figure, Panel, Series, Shape};
 use maud::html;
 
-/// What is drawn: title, unit, factor, quantities with their colours.
-const PANELS: [(&str, f64, &[(usize, Colour)]); 3] = [
+/// Title, factor, quantities with their colours.
+type Drawn = (&'static str, f64, &'static [(usize, Colour)]);
+
+/// What is drawn.
+const PANELS: [Drawn; 3] = [
     ("mass, kg", 1.0, &[(0, Colour::BLUE)]),
     (
         "centre of mass, mm",

@@ -279,7 +279,7 @@ pub(crate) fn joint_values(
     }
     if let Some(force) = &entry.stribeck {
         let (at, force) = (force.span().start, *force.get_ref());
-        if !(force >= 0.0 && force <= LARGEST) {
+        if !(0.0..=LARGEST).contains(&force) {
             return Err(source.error(
                 at,
                 what,
