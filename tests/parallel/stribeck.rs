@@ -2,7 +2,7 @@
 //! and of the files that are written.
 
 use excite::Plant;
-use excite::design::{Question, Settings as Design, design};
+use excite::design::{Question, design};
 use excite::dynamics::Samples;
 use excite::export::{Model, write};
 use excite::identify::{Identification, identify};
@@ -98,10 +98,7 @@ fn bounds_of_the_torque_count_it() {
         let more = bound(&with) - bound(&without);
         assert!((more - 12.0).abs() < 0.2, "{}: {more}", with.name());
         // a simulated robot sticks by it, and its log is explained
-        let settings = Settings {
-            rate: 200.0,
-            ..Settings::default()
-        };
+        let settings = Settings::default().with(|set| set.rate = 200.0);
         let run = simulate(&with, &fourier, 1, &settings, &|_| {}).unwrap();
         // where it slides: what holds a joint at rest is no function of the motion
         let moved = with.actuator_motion(&run.motion).unwrap();
@@ -199,20 +196,18 @@ fn identify_finds_it_beside_coulomb_and_viscous_friction() {
         };
         let mut records = Vec::new();
         for (k, (period, periods)) in motions.into_iter().enumerate() {
-            let settings = Design {
-                harmonics: 5,
-                period,
-                periods,
-                starts: Some(1),
-                ..Question::Friction.settings()
-            };
+            let settings = Question::Friction.settings().with(|set| {
+                set.harmonics = 5;
+                set.period = period;
+                set.periods = periods;
+                set.starts = Some(1);
+            });
             let motion = design(&file, &settings).unwrap().trajectory;
-            let simulation = Settings {
-                rate: 500.0,
-                step: 1e-3,
-                seed: 3 + k as u64,
-                ..Settings::default()
-            };
+            let simulation = Settings::default().with(|set| {
+                set.rate = 500.0;
+                set.step = 1e-3;
+                set.seed = 3 + k as u64;
+            });
             let run = simulate(&truth, &motion.fourier, periods, &simulation, &|_| {}).unwrap();
             let (sensors, _) = Sensors::new(&truth, 1.0);
             let measured = measure(&run, &sensors, &simulation.effects, simulation.seed);
