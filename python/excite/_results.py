@@ -117,7 +117,7 @@ class _Model(Result):
         if self._report is None:
             raise unusable("this result was read or copied; call the function again to write its model into a scene")
         scene, folder = Path(os.fspath(scene)), Path(os.fspath(folder))
-        files, text, warnings = self._report.into_scene(scene, folder)
+        files, text, warnings = self._report.edited_scene(scene, folder)
         _excite.save(folder, [(name, content.encode()) for name, content in files], [], force)
         value: Dict[str, Any] = json.loads(text)
         emit(notices(warnings))

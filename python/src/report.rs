@@ -44,7 +44,7 @@ impl Report {
 
     /// The model in a copy of an MJCF or URDF: names and texts of the files, what changed as JSON, warnings.
     #[allow(clippy::type_complexity)]
-    fn into_scene(
+    fn edited_scene(
         &self,
         py: Python<'_>,
         scene: PathBuf,

@@ -47,7 +47,7 @@ pub enum Criterion {
     A,
     /// smallest eigenvalue (maximised)
     E,
-    /// base parameters known to [`TARGET`] of their nominal value, by prior and motion together
+    /// base parameters known to 10 % of their nominal value, by prior and motion together
     Known,
 }
 

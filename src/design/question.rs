@@ -167,7 +167,7 @@ pub fn felt(plant: &Plant, tool: usize) -> Result<BaseParameters> {
     BaseParameters::from_matrix(names, UNITS.to_vec(), columns.as_ref())
 }
 
-/// Accuracies that count the same for a load: of its [`Quantities`].
+/// Accuracies that count the same for a load: of its mass, centre of mass and tensor.
 pub fn accuracies(load: &Inertia) -> Quantities {
     let q = load.quantities();
     let mass = load.mass().abs().max(1e-9);

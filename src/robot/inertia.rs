@@ -82,7 +82,7 @@ impl Inertia {
         }
     }
 
-    /// Mass, centre of mass, tensor about it: see [`Quantities`].
+    /// Mass, centre of mass, tensor about it: see `Quantities`.
     pub fn quantities(&self) -> Quantities {
         let c = self.com().unwrap_or_else(Vector3::zeros);
         let i = self.tensor_com();
@@ -100,13 +100,13 @@ impl Inertia {
         ]
     }
 
-    /// The body with these [`Quantities`].
+    /// The body with these `Quantities`.
     pub fn from_quantities(v: &Quantities) -> Self {
         let tensor = Matrix3::new(v[4], v[5], v[6], v[5], v[7], v[8], v[6], v[8], v[9]);
         Self::from_com(v[0], Vector3::new(v[1], v[2], v[3]), tensor)
     }
 
-    /// Derivatives of the [`Quantities`] (rows) by the ten parameters (columns), by central differences: the map is a
+    /// Derivatives of the `Quantities` (rows) by the ten parameters (columns), by central differences: the map is a
     /// rational function of low order.
     pub fn quantity_slopes(&self) -> [Quantities; PARAMETERS] {
         let scale = self.0.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-12);

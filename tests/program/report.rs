@@ -115,7 +115,10 @@ fn check_json(value: &Value, place: &str, may_be_null: &[&str]) {
                 || [
                     ".known_to_10_percent",
                     ".torque_uncertainty",
-                    ".limits.tool"
+                    ".limits.tool",
+                    ".load",
+                    ".settings.question",
+                    ".settings.payload",
                 ]
                 .contains(&place)
                 || [".torque_rate", ".velocity_by_position"]
