@@ -154,7 +154,11 @@ pub fn campaign(folder: &Path, periods: u32) -> Result<Figures> {
 }
 
 fn main() -> Result<()> {
-    let folder = match std::env::args().nth(1) {
+    // a number is for the examples that repeat themselves at random
+    let folder = std::env::args()
+        .nth(1)
+        .filter(|a| a.parse::<f64>().is_err());
+    let folder = match folder {
         Some(folder) => PathBuf::from(folder),
         None => std::env::temp_dir().join("hexapod_campaign"),
     };

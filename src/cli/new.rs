@@ -5,7 +5,7 @@ use excite::output::prepare_dir;
 use excite::{Error, Result, Robot};
 use std::path::{Component, Path, PathBuf};
 
-/// Write a commented robot.toml for a URDF, or for a parallel robot with the experiment that goes with it.
+/// Write a commented robot.toml for a URDF or a parallel robot
 #[derive(clap::Args)]
 #[command(
     long_about = "Write a commented robot.toml for a URDF: all joints with their present limits, and every key that \

@@ -694,7 +694,7 @@ fn every_command_keeps_to_the_exit_status() {
         "merge none.factor",
         "merge arm.toml",
         "export planar2 --to mujoco --into none.xml",
-        "export delta --to mujoco",
+        "export delta --to sdf",
         "load none.toml",
         "torque planar2 none.csv",
         "simulate planar2 none.json",
