@@ -8,8 +8,9 @@
 //! Where a rod ends is found from the model itself: the point of its axis that stays where it is in the frame of the
 //! platform, or of one of its bars, while these move.
 
+use super::mujoco::body::{kind, open, placement};
+use super::mujoco::followers;
 use super::mujoco::joint::OnJoint;
-use super::mujoco::{followers, solid};
 use super::{Format, Model, Part, breakaway, escape, remark, xml_comment};
 use crate::collision::scene::poses;
 use crate::error::{Error, Result};
@@ -274,18 +275,11 @@ fn sites(joins: &[Join], on: Option<usize>, pad: &str, out: &mut String) {
             if site.body != on {
                 continue;
             }
-            let (p, q) = (site.position, UnitQuaternion::from_matrix(&site.rotation));
+            let at = placement(&site.position, &UnitQuaternion::from_matrix(&site.rotation));
             let _ = writeln!(
                 out,
-                "{pad}<site name=\"loop{}_{end}\" pos=\"{} {} {}\" quat=\"{} {} {} {}\" size=\"0.005\"/>",
-                i + 1,
-                p.x,
-                p.y,
-                p.z,
-                q.w,
-                q.i,
-                q.j,
-                q.k
+                "{pad}<site name=\"loop{}_{end}\" {at} size=\"0.005\"/>",
+                i + 1
             );
         }
     }
@@ -314,41 +308,8 @@ fn body(
             }
         }
     }
-    let q = UnitQuaternion::from_matrix(&rotation);
-    let _ = writeln!(
-        out,
-        "{pad}<body name=\"{}\" pos=\"{} {} {}\" quat=\"{} {} {} {}\">",
-        escape(&body.name),
-        position.x,
-        position.y,
-        position.z,
-        q.w,
-        q.i,
-        q.j,
-        q.k
-    );
-    let inertia = solid(&body.inertia);
-    if let Some(c) = inertia.com() {
-        let i = inertia.tensor_com();
-        let _ = writeln!(
-            out,
-            "{pad}  <inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/>",
-            c.x,
-            c.y,
-            c.z,
-            inertia.mass(),
-            i.m11,
-            i.m22,
-            i.m33,
-            i.m12,
-            i.m13,
-            i.m23
-        );
-    }
-    let kind = match body.motion {
-        Motion::Revolute => "hinge",
-        Motion::Prismatic => "slide",
-    };
+    open(out, &pad, body, &position, &rotation);
+    let kind = kind(body);
     let mut attributes = String::new();
     if leads {
         let actuated = mechanism.actuated.contains(&body.coordinate);

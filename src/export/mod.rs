@@ -254,6 +254,18 @@ const LEAST: f64 = 1e-6;
 /// Part of the largest second moment by which rounding may make another negative.
 const ROUNDING: f64 = 1e-9;
 
+/// Moments of a tensor by the names that URDF and SDFormat have for them.
+pub(crate) fn named_moments(tensor: &Matrix3<f64>) -> [(&'static str, f64); 6] {
+    [
+        ("ixx", tensor.m11),
+        ("ixy", tensor.m12),
+        ("ixz", tensor.m13),
+        ("iyy", tensor.m22),
+        ("iyz", tensor.m23),
+        ("izz", tensor.m33),
+    ]
+}
+
 /// The nearest body that can exist: the same where it can, otherwise with the same mass and centre and
 /// with the negative second moments about it raised to zero, where `Σ_c = ½ tr(I_c) 1 − I_c` (the
 /// triangle inequality of the principal moments is `Σ_c ⪰ 0`; Wensing, Kim & Slotine 2018). A body of

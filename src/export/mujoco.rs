@@ -5,8 +5,10 @@
 //! `b = 1 / timestep`, it is that of `q̇` down to `q̈ / b`. A constant torque is a spring so far away that its force
 //! does not change.
 
+pub(super) mod body;
 pub(super) mod joint;
 
+use body::{kind, open};
 pub(super) use joint::{OnJoint, spring};
 
 use super::element::{Element, Form, Kind};
@@ -15,8 +17,7 @@ use super::{
 };
 use crate::error::Result;
 use crate::plant::Plant;
-use crate::robot::{Body, Inertia, JointTerm, Motion, Robot};
-use nalgebra::UnitQuaternion;
+use crate::robot::{Body, Inertia, JointTerm, Robot};
 use std::fmt::Write;
 
 /// MuJoCo's XML.
@@ -308,44 +309,10 @@ impl<'a> Parts<'a> {
     fn body(&self, robot: &Robot, index: usize, depth: usize, out: &mut String) {
         let body = &robot.bodies[index];
         let pad = "  ".repeat(depth);
-        let q = UnitQuaternion::from_matrix(&body.rotation);
-        let p = body.position;
-        let _ = writeln!(
-            out,
-            "{pad}<body name=\"{}\" pos=\"{} {} {}\" quat=\"{} {} {} {}\">",
-            escape(&body.name),
-            p.x,
-            p.y,
-            p.z,
-            q.w,
-            q.i,
-            q.j,
-            q.k
-        );
-        let inertia = solid(&body.inertia);
-        if let Some(c) = inertia.com() {
-            let i = inertia.tensor_com();
-            let _ = writeln!(
-                out,
-                "{pad}  <inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/>",
-                c.x,
-                c.y,
-                c.z,
-                inertia.mass(),
-                i.m11,
-                i.m22,
-                i.m33,
-                i.m12,
-                i.m13,
-                i.m23
-            );
-        }
+        open(out, &pad, body, &body.position, &body.rotation);
         let joint = &robot.joints[body.coordinate];
         let leads = body.joint_name == joint.name;
-        let kind = match body.motion {
-            Motion::Revolute => "hinge",
-            Motion::Prismatic => "slide",
-        };
+        let kind = kind(body);
         let axis = format!("{} {} {}", body.axis.x, body.axis.y, body.axis.z);
         let mut attributes = String::new();
         if leads && joint.limits.position.iter().all(|x| x.is_finite()) {

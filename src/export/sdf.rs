@@ -3,7 +3,8 @@
 //! Friction and a straight spring stand in `<dynamics>`; rotor inertia, offsets and effects have no element there.
 
 use super::{
-    Element, Form, Format, Model, Part, base_name, escape, possible, remark, rpy, xml_comment,
+    Element, Form, Format, Model, Part, base_name, escape, named_moments, possible, remark, rpy,
+    xml_comment,
 };
 use crate::error::Result;
 use crate::robot::{Body, JointTerm, Motion, Robot};
@@ -111,16 +112,9 @@ fn link(robot: &Robot, body: &Body, base: &str, out: &mut String) {
     );
     let inertia = possible(&body.inertia);
     if let Some(c) = inertia.com() {
-        let i = inertia.tensor_com();
-        let moments = [
-            ("ixx", i.m11),
-            ("ixy", i.m12),
-            ("ixz", i.m13),
-            ("iyy", i.m22),
-            ("iyz", i.m23),
-            ("izz", i.m33),
-        ];
-        let moments = moments.map(|(k, v)| format!("<{k}>{v}</{k}>")).concat();
+        let moments = named_moments(&inertia.tensor_com())
+            .map(|(k, v)| format!("<{k}>{v}</{k}>"))
+            .concat();
         let _ = writeln!(
             out,
             "      <inertial>\n        <pose>{}</pose>\n        <mass>{}</mass>\n        <inertia>{moments}</inertia>\n      \

@@ -1,7 +1,9 @@
 //! The Unified Robot Description Format. Friction stands in `<dynamics>`; rotor inertia, offset and gravity
 //! have no place there.
 
-use super::{Format, Model, Part, base_name, escape, possible, remark, rpy, xml_comment};
+use super::{
+    Format, Model, Part, base_name, escape, named_moments, possible, remark, rpy, xml_comment,
+};
 use crate::error::Result;
 use crate::robot::{JointTerm, Motion, Robot};
 use std::fmt::Write;
@@ -53,21 +55,17 @@ fn tree(robot: &Robot) -> String {
         let _ = writeln!(out, "  <link name=\"{}\">", escape(&body.name));
         let inertia = possible(&body.inertia);
         if let Some(c) = inertia.com() {
-            let i = inertia.tensor_com();
+            let tensor = named_moments(&inertia.tensor_com())
+                .map(|(k, v)| format!(" {k}=\"{v}\""))
+                .concat();
             let _ = writeln!(
                 out,
                 "    <inertial>\n      <origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/>\n      <mass value=\"{}\"/>\n      \
-                 <inertia ixx=\"{}\" ixy=\"{}\" ixz=\"{}\" iyy=\"{}\" iyz=\"{}\" izz=\"{}\"/>\n    </inertial>",
+                 <inertia{tensor}/>\n    </inertial>",
                 c.x,
                 c.y,
                 c.z,
-                inertia.mass(),
-                i.m11,
-                i.m12,
-                i.m13,
-                i.m22,
-                i.m23,
-                i.m33
+                inertia.mass()
             );
         }
         out.push_str("  </link>\n");

@@ -339,10 +339,8 @@ fn speeds(found: &Identified) -> Section {
         width: Figure::WIDTH,
         height: 130.0,
         columns: 3,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     Section::new(

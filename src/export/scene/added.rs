@@ -6,6 +6,7 @@ use super::text::Edits;
 use crate::error::Result;
 use crate::export::Element;
 use crate::export::escape;
+use crate::export::mujoco::body::{inertial, placement};
 use crate::export::mujoco::{Parts, free_name, stiff};
 use crate::robot::mjcf::xml::Node;
 use crate::robot::{Inertia, Motion, Robot};
@@ -60,24 +61,11 @@ impl Work<'_> {
         };
         let (node, anchor) = (part.node, part.anchor);
         let load = load.in_parent(&Matrix3::identity(), &anchor);
-        let (c, i) = (load.com().unwrap_or_default(), load.tensor_com());
         let mut name = "payload".to_string();
         while self.parts.iter().any(|p| p.link == name) {
             name.push('_');
         }
-        let line = format!(
-            "<body name=\"{name}\"><inertial pos=\"{} {} {}\" mass=\"{}\" fullinertia=\"{} {} {} {} {} {}\"/></body>",
-            c.x,
-            c.y,
-            c.z,
-            load.mass(),
-            i.m11,
-            i.m22,
-            i.m33,
-            i.m12,
-            i.m13,
-            i.m23
-        );
+        let line = format!("<body name=\"{name}\">{}</body>", inertial(&load));
         self.edits.inside(node, std::slice::from_ref(&line));
         self.edits
             .say(node, format!("body {name}"), "", [None, Some(line)]);
@@ -294,10 +282,7 @@ fn placed(at: &Pose) -> String {
     let (p, q) = (at.translation.vector, at.rotation);
     match p.norm() < 1e-12 && q.angle() < 1e-12 {
         true => String::new(),
-        false => format!(
-            " pos=\"{} {} {}\" quat=\"{} {} {} {}\"",
-            p.x, p.y, p.z, q.w, q.i, q.j, q.k
-        ),
+        false => format!(" {}", placement(&p, &q)),
     }
 }
 

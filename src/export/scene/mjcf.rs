@@ -7,6 +7,7 @@ use super::{Edited, assets};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::export::Model;
 use crate::export::effects::Effects;
+use crate::export::mujoco::body::inertial;
 use crate::export::mujoco::{Parts, solid};
 use crate::export::{Format, possible};
 use crate::robot::mjcf::body::{Part, Reader};
@@ -367,10 +368,7 @@ impl<'a> Work<'a> {
         let of = format!("{} inertial", Edits::called(node));
         let pos = text(com.as_slice());
         let Some(stated) = node.all("inertial").next() else {
-            let line = format!(
-                "<inertial pos=\"{pos}\" mass=\"{mass}\" fullinertia=\"{}\"/>",
-                text(&wanted)
-            );
+            let line = inertial(&here);
             match node.children.first() {
                 Some(first) => self.edits.before(first, std::slice::from_ref(&line)),
                 None => self.edits.inside(node, std::slice::from_ref(&line)),

@@ -5,7 +5,7 @@ use super::mjcf::{moved, stand};
 use super::text::Edits;
 use super::{Edited, assets};
 use crate::error::Result;
-use crate::export::{Model, possible, rpy};
+use crate::export::{Model, named_moments, possible, rpy};
 use crate::robot::mjcf::xml::{Node, sources};
 use crate::robot::urdf::Urdf;
 use crate::robot::{Inertia, JointTerm, Motion};
@@ -132,21 +132,11 @@ pub(super) fn write(model: &Model, file: &Path, text: &str, folder: &Path) -> Re
 
 /// Writes the inertia of a link.
 fn inertial(edits: &mut Edits, node: &Node, now: &Inertia, wanted: &Inertia) {
-    let (mass, com, i) = (
-        wanted.mass(),
-        wanted.com().unwrap_or_default(),
-        wanted.tensor_com(),
-    );
+    let (mass, com) = (wanted.mass(), wanted.com().unwrap_or_default());
     let of = format!("{} inertial", Edits::called(node));
     let xyz = format!("{} {} {}", com.x, com.y, com.z);
-    let moments = [
-        ("ixx", i.m11),
-        ("ixy", i.m12),
-        ("ixz", i.m13),
-        ("iyy", i.m22),
-        ("iyz", i.m23),
-        ("izz", i.m33),
-    ];
+    let i = wanted.tensor_com();
+    let moments = named_moments(&i);
     let list = moments.map(|(k, v)| format!(" {k}=\"{v}\"")).concat();
     let Some(stated) = node.all("inertial").next() else {
         let lines = [

@@ -63,10 +63,8 @@ pub(super) fn section(found: &Identified) -> Option<Section> {
         width: Figure::WIDTH,
         height: 170.0,
         columns: 3,
-        column_titles: Vec::new(),
-        row_titles: Vec::new(),
-        share_x: false,
         panels,
+        ..Figure::default()
     }
     .svg();
     let cutoffs: Vec<String> = found
