@@ -103,7 +103,7 @@ pub fn nominal_torque(robot: &Robot, tree: &Tree, motion: &Samples) -> Vec<f64> 
 }
 
 /// The nominal torque of one state as a function, for
-/// [`write_samples`](crate::trajectory::samples::write_samples) and the like.
+/// [`write_along`](crate::trajectory::samples::write_along) and the like.
 #[doc(hidden)]
 pub fn torque_function<'a>(
     robot: &'a Robot,

@@ -41,7 +41,7 @@ impl Mechanism {
     /// `q1.. dq1.. ddq1.. tau1..` of the actuators (nominal forces), then the platform as [`Mechanism::read_motion`] reads it.
     ///
     /// # Errors
-    /// A pose that cannot be taken, and as [`write_samples`](crate::trajectory::samples::write_samples).
+    /// A pose that cannot be taken, and as [`write_along`](crate::trajectory::samples::write_along).
     pub fn write_along(
         &self,
         path: impl AsRef<Path>,

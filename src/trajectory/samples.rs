@@ -134,30 +134,11 @@ pub fn times(duration: f64, rate: f64) -> Result<Vec<f64>> {
     Ok(t)
 }
 
-/// Writes a trajectory as CSV at `rate` hertz for so many periods, end point included (see
-/// [`times`]), with torques where `torque` is given; whole or not at all. Numbers have the fewest
-/// digits that read back as the same number. Returns the number of samples.
-///
-/// # Errors
-/// As [`times`] and [`write_atomic`]; [`Error::Io`] if a number is not finite.
-pub fn write_samples(
-    path: impl AsRef<Path>,
-    force: bool,
-    trajectory: &Fourier,
-    periods: u32,
-    rate: f64,
-    torque: Option<&TorqueFn>,
-) -> Result<usize> {
-    let times = times(trajectory.period * f64::from(periods), rate)?;
-    let at = |t: f64, out: [&mut [f64]; 3]| trajectory.evaluate(t, out);
-    write_along(path, force, trajectory.dof(), &times, &at, torque)?;
-    Ok(times.len())
-}
-
 /// Positions, velocities and accelerations at a time.
 pub type StateFn<'a> = dyn Fn(f64, [&mut [f64]; 3]) + 'a;
 
-/// Writes any motion of `dof` joints at these times, as [`write_samples`] does.
+/// Writes a motion of `dof` joints at these times as CSV, with torques where `torque` is given; whole or not at all.
+/// Numbers have the fewest digits that read back as the same number.
 ///
 /// # Errors
 /// As [`write_atomic`]; [`Error::Io`] if a number is not finite.

@@ -15,6 +15,15 @@ fn motion() -> Fourier {
     Fourier::new(1.5, vec![1, 4], vec![a, b]).unwrap()
 }
 
+/// Writes so many periods of [`motion`] at `rate` hertz; how many samples these are.
+fn write(path: &Path, periods: u32, rate: f64, torque: &TorqueFn) -> Result<usize> {
+    let f = motion();
+    let times = times(f.period * f64::from(periods), rate)?;
+    let at = |t: f64, out: [&mut [f64]; 3]| f.evaluate(t, out);
+    write_along(path, false, f.dof(), &times, &at, Some(torque))?;
+    Ok(times.len())
+}
+
 #[test]
 fn written_samples_read_back_exactly() {
     let dir = tempfile::tempdir().unwrap();
@@ -25,7 +34,7 @@ fn written_samples_read_back_exactly() {
             .enumerate()
             .for_each(|(j, v)| *v = q[j] + 1e-20 * qd[j] * qdd[j]);
     };
-    let count = write_samples(&path, false, &f, 2, 100.0, Some(&torque)).unwrap();
+    let count = write(&path, 2, 100.0, &torque).unwrap();
     assert_eq!(count, 301);
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(text.starts_with("t,q1,q2,dq1,dq2,ddq1,ddq2,tau1,tau2\n0,"));
@@ -123,7 +132,7 @@ fn torques_that_are_not_finite_are_not_written() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("samples.csv");
     let torque = |_: &[f64], _: &[f64], _: &[f64], tau: &mut [f64]| tau.fill(f64::NAN);
-    let result = write_samples(&path, false, &motion(), 1, 10.0, Some(&torque));
+    let result = write(&path, 1, 10.0, &torque);
     assert!(result.unwrap_err().to_string().contains("not finite"));
     assert!(!path.exists());
 }
