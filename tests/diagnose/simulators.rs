@@ -2,6 +2,7 @@
 //! (`every_effect.py`), are diagnosed; what was written is loaded again. `PYTHON` names the interpreter, `python3`
 //! otherwise; without MuJoCo, NumPy and SciPy the tests say so and are skipped.
 
+use super::common::python;
 use excite::diagnose::{Settings, diagnose};
 use excite::export::{self, Model};
 use excite::log::Experiment;
@@ -11,20 +12,6 @@ use std::process::Command;
 
 /// Share of the energy of the gap that may be left on a record that was not fitted.
 const LEFT: f64 = 0.1;
-
-fn python() -> Option<String> {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let found = Command::new(&python)
-        .args(["-c", "import mujoco, numpy, scipy"])
-        .output();
-    match found.is_ok_and(|o| o.status.success()) {
-        true => Some(python),
-        false => {
-            println!("skipped: {python} has no mujoco, numpy or scipy");
-            None
-        }
-    }
-}
 
 fn script(python: &str, what: &str, folder: &Path, effects: &[&str]) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/diagnose/every_effect.py");
@@ -70,7 +57,9 @@ fn diagnosed(folder: &Path) {
 
 /// Makes machines with these effects, diagnoses their logs, and asks how much the files leave.
 fn left_in_mujoco(effects: &[&str]) {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco, numpy, scipy") else {
+        return;
+    };
     let folder = tempfile::tempdir().unwrap();
     script(&python, "make", folder.path(), effects);
     let cases: Vec<_> = effects.iter().map(|e| folder.path().join(e)).collect();

@@ -107,6 +107,21 @@ fn merged_factors_give_what_all_records_give() {
     }
 }
 
+/// Breakaway friction is asked for, and no factor can hold it: it is said, and `merge` says it again.
+#[test]
+fn breakaway_friction_is_not_condensed_in_silence() {
+    let plain = plant();
+    let records = records(&plain);
+    let mut robot = plain.robot().clone();
+    robot.joints[0].stribeck.fit = true;
+    let factor = of(&Plant::from(&robot), &records);
+    let said = |all: &[excite::Warning]| all.iter().any(|w| w.subject == "breakaway friction");
+    assert!(said(&factor.header.warnings));
+    assert!(!said(&of(&plain, &records).header.warnings));
+    let found = merged(&plain, &[&factor], &settings(Method::Wls));
+    assert!(said(&found.warnings));
+}
+
 /// A real arm whose wrist is coupled: what goes with another joint is fitted aside.
 #[test]
 fn a_real_experiment_as_a_whole() {

@@ -5,7 +5,7 @@ use excite::moves::{Move, SPEEDS, Settings, State, rehearse};
 use excite::robot::JointTerm;
 use excite::robot::{Limits, Robot};
 use excite::solid::Shape;
-use excite::trajectory::{Basis, Ends, Fourier, Series, Trajectory, extrema};
+use excite::trajectory::{Basis, Ends, Fourier, Series, Trajectory, extrema, samples};
 use excite::{Error, Plant};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
@@ -538,11 +538,10 @@ fn the_rehearsal_balances_power_and_counts_bytes() {
         };
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("slow.csv");
-        let samples = excite::trajectory::samples::write_samples;
-        assert_eq!(
-            samples(&file, false, &slow, 2, 250.0, None).unwrap(),
-            s.samples
-        );
+        let times = samples::times(2.0 * slow.period, 250.0).unwrap();
+        let at = |t: f64, out: [&mut [f64]; 3]| slow.evaluate(t, out);
+        samples::write_along(&file, false, slow.dof(), &times, &at, None).unwrap();
+        assert_eq!(times.len(), s.samples);
         assert_eq!(std::fs::metadata(&file).unwrap().len(), s.bytes as u64);
         for (l, joint) in s.joints.iter().zip(&robot.joints) {
             assert!(l.rms_torque <= l.torque && l.mean_power <= l.peak_power);

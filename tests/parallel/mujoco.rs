@@ -1,6 +1,7 @@
 //! MuJoCo's file of parallel robots, loaded by MuJoCo where Python has it (`PYTHON` names the interpreter; `python3`
 //! otherwise): closed in every pose, the same actuator forces, and at rest under the forces that hold it.
 
+use super::common::python;
 use super::loops::pairs;
 use excite::Plant;
 use excite::export::{Model, write};
@@ -61,18 +62,6 @@ while data.time < 0.1:
     widest = max(widest, gap())
 print(numpy.abs(data.qpos - home).max(), widest)
 "#;
-
-fn python() -> Option<String> {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let found = Command::new(&python).args(["-c", "import mujoco"]).output();
-    match found.is_ok_and(|o| o.status.success()) {
-        true => Some(python),
-        false => {
-            println!("skipped: {python} has no module mujoco");
-            None
-        }
-    }
-}
 
 /// The same without friction, which inverse dynamics of MuJoCo counts as a constraint.
 fn smooth(mut m: Mechanism) -> Mechanism {
@@ -159,7 +148,9 @@ fn check(python: &str, name: &str, m: Mechanism) {
 
 #[test]
 fn mujoco_loads_every_parallel_robot_and_agrees() {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco") else {
+        return;
+    };
     for name in ["hexapod", "h4", "delta"] {
         let plant = Plant::load(name).unwrap();
         check(&python, name, plant.mechanism().unwrap().clone());

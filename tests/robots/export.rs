@@ -1,24 +1,12 @@
 //! Robot files of every bundled serial robot, loaded by MuJoCo where Python has it (`PYTHON` names the
 //! interpreter; `python3` otherwise).
 
+use super::common::python;
 use excite::Plant;
 use excite::export::{Model, Remark, write};
 use excite::robot::Robot;
 use std::path::Path;
 use std::process::Command;
-
-/// A Python with MuJoCo, or a word that there is none.
-fn python() -> Option<String> {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let found = Command::new(&python).args(["-c", "import mujoco"]).output();
-    match found.is_ok_and(|o| o.status.success()) {
-        true => Some(python),
-        false => {
-            println!("skipped: {python} has no module mujoco");
-            None
-        }
-    }
-}
 
 /// Output of a script with arguments.
 fn run(python: &str, script: &str, arguments: &[&Path]) -> String {
@@ -102,7 +90,9 @@ fn differs(python: &str, xml: &str, robot: &Robot, shift: f64, extra: impl Fn(f6
 
 #[test]
 fn mujoco_loads_every_serial_robot_and_agrees() {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco") else {
+        return;
+    };
     for name in ["planar2", "scara", "puma560", "panda", "iiwa14", "ur5e"] {
         let plant = Plant::load(name).unwrap();
         let off = differs(
@@ -127,7 +117,9 @@ fn noted(plant: &Plant, attributes: &str) -> String {
 
 #[test]
 fn signs_of_springs_and_references_are_those_of_mujoco() {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco") else {
+        return;
+    };
     let plant = Plant::load("planar2").unwrap();
     let robot = plant.robot();
     // the diagnosis adds k (q − q₀) to the torque, and τ(q + δ) − τ(q) for an offset δ
@@ -218,12 +210,10 @@ print(mass, joints)
 
 #[test]
 fn usd_is_read_by_its_own_library() {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let found = Command::new(&python).args(["-c", "import pxr"]).output();
-    if !found.is_ok_and(|o| o.status.success()) {
-        println!("skipped: {python} has no module pxr (usd-core)");
+    // of the package usd-core
+    let Some(python) = python::with("pxr") else {
         return;
-    }
+    };
     for name in ["scara", "panda", "ur5e"] {
         let plant = Plant::load(name).unwrap();
         let folder = tempfile::tempdir().unwrap();
@@ -254,11 +244,9 @@ for name, cfg in space["ACTUATORS"].items():
 
 #[test]
 fn isaac_lab_has_the_terms_of_the_joints() {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    if Command::new(&python).arg("--version").output().is_err() {
-        println!("skipped: there is no {python}");
+    let Some(python) = python::with("sys") else {
         return;
-    }
+    };
     let plant = Plant::load("planar2").unwrap();
     let late = Remark {
         effect: "torque_delay",

@@ -1,6 +1,7 @@
 //! Models written into scenes of their users, against the files that are written without one: MuJoCo's inverse dynamics
 //! is the same (`PYTHON` names the interpreter; `python3` otherwise).
 
+use super::common::python;
 use excite::Plant;
 use excite::export::{Element, Model, Remark, into_scene, write};
 use excite::robot::{Inertia, JointTerm, Robot};
@@ -83,18 +84,6 @@ for _ in range(60):
 m = models[1]
 print(worst / size, m.actuator("ma").gear[0], m.actuator("pb").gainprm[0], m.nkey, m.ncam, *m.key_qpos[0][:m.nq])
 "#;
-
-fn python() -> Option<String> {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let found = Command::new(&python).args(["-c", "import mujoco"]).output();
-    match found.is_ok_and(|o| o.status.success()) {
-        true => Some(python),
-        false => {
-            println!("skipped: {python} has no module mujoco");
-            None
-        }
-    }
-}
 
 /// The folder of a user whose base stands as `base` says, and the robot in it.
 fn user(folder: &Path, base: &str) -> Plant {
@@ -187,7 +176,9 @@ fn compare(folder: &Path, plant: &Plant, remarks: &[Remark], python: &str) -> Ve
 
 #[test]
 fn a_scene_has_the_inverse_dynamics_of_the_written_robot() {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco") else {
+        return;
+    };
     for base in ["", " pos=\"0.3 0.2 0.1\" euler=\"90 5 0\""] {
         let folder = tempfile::tempdir().unwrap();
         let plant = user(folder.path(), base);
@@ -226,7 +217,9 @@ fn in_other_frames(robot: &Robot) -> Robot {
 
 #[test]
 fn a_scene_of_a_robot_with_other_frames() {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco") else {
+        return;
+    };
     let folder = tempfile::tempdir().unwrap();
     let plant = user(folder.path(), " pos=\"0 0 0.5\"");
     let robot = in_other_frames(plant.robot());
@@ -258,7 +251,9 @@ fn a_scene_of_a_robot_with_other_frames() {
 
 #[test]
 fn effects_that_are_elements_are_in_the_scene() {
-    let Some(python) = python() else { return };
+    let Some(python) = python::with("mujoco") else {
+        return;
+    };
     let folder = tempfile::tempdir().unwrap();
     let plant = user(folder.path(), " pos=\"0.3 0.2 0.1\" euler=\"90 5 0\"");
     let load = Inertia::from_com(0.25, Vector3::new(0.0, 0.01, 0.05), Matrix3::zeros());

@@ -1,6 +1,7 @@
 //! MJCF files against MuJoCo's own inverse dynamics, where Python has it (`PYTHON` names the interpreter; `python3`
 //! otherwise).
 
+use super::common::python;
 use excite::Plant;
 use std::process::Command;
 
@@ -60,8 +61,6 @@ for line in open(sys.argv[2]):
 
 #[test]
 fn an_mjcf_has_the_inverse_dynamics_of_mujoco() {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-    let found = Command::new(&python).args(["-c", "import mujoco"]).output();
     let folder = tempfile::tempdir().unwrap();
     let [model, more, states] = ["model.xml", "more.xml", "states"].map(|n| folder.path().join(n));
     std::fs::write(&model, MODEL).unwrap();
@@ -74,10 +73,9 @@ fn an_mjcf_has_the_inverse_dynamics_of_mujoco() {
         .map(|j| j.name.as_str())
         .collect();
     assert_eq!(names, ["a1", "a2", "b1", "c1", "t1"]);
-    if !found.is_ok_and(|o| o.status.success()) {
-        println!("skipped: {python} has no module mujoco");
+    let Some(python) = python::with("mujoco") else {
         return;
-    }
+    };
     let x = plant.random_states(50, 3);
     let mut text = String::new();
     for s in 0..x.count {
