@@ -5,12 +5,11 @@ use crate::error::{notices, to_python};
 use crate::named::named;
 use crate::plant::Plant;
 use crate::records::Experiment;
-use crate::report::Report;
+use crate::report::{Report, scene};
 use crate::verbs::texts;
 use excite::cli::{identify as terms, pretty, unwritten};
-use excite::export::{Model, into_scene, write};
+use excite::export::{Model, write};
 use excite::identify::{self as identification, Factor};
-use excite::robot::Prior;
 use excite::signals;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -91,8 +90,7 @@ pub fn merge(
         let read = |b: &Vec<u8>| Factor::from_bytes(b, Path::new(NAME));
         let factors = factors.iter().map(read).collect::<excite::Result<_>>()?;
         let mut found = identification::merge(&plant, factors, &settings)?;
-        let mut robot = plant.with_values(&found.phi);
-        robot.prior = Prior::Identified;
+        let robot = found.robot(&plant);
         let model = Model {
             plant: &plant,
             robot: &robot,
@@ -109,14 +107,7 @@ pub fn merge(
                 let plant = plant.clone();
                 Arc::new(move || found.html(&plant))
             },
-            scene: Some(Arc::new(move |scene, folder| {
-                let model = Model {
-                    plant: &plant,
-                    robot: &robot,
-                    remarks: &[],
-                };
-                into_scene(&model, scene, folder)
-            })),
+            scene: scene(plant, robot, Vec::new()),
         })
     })
 }

@@ -2,14 +2,27 @@
 
 use crate::call::simply;
 use crate::error::{notices, to_python};
-use excite::export::Edited;
-use excite::{Error, Warning};
+use excite::export::{Edited, Model, Remark, into_scene};
+use excite::robot::Robot;
+use excite::{Error, Plant, Warning};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The model of a result written into a file of the user, for a folder.
 pub type Scene = Arc<dyn Fn(&Path, &Path) -> excite::Result<Edited> + Send + Sync>;
+
+/// The [`Scene`] of a model: a robot of this plant, and what its bodies and joints cannot hold.
+pub fn scene(plant: Plant, robot: Robot, remarks: Vec<Remark>) -> Option<Scene> {
+    Some(Arc::new(move |scene, folder| {
+        let model = Model {
+            plant: &plant,
+            robot: &robot,
+            remarks: &remarks,
+        };
+        into_scene(&model, scene, folder)
+    }))
+}
 
 /// The result of a stage.
 #[pyclass(frozen, module = "excite._excite")]

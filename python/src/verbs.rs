@@ -6,11 +6,10 @@ use crate::error::notices;
 use crate::named::named;
 use crate::plant::Plant;
 use crate::records::Experiment;
-use crate::report::Report;
+use crate::report::{Report, scene};
 use excite::cli::{export as program, identify as terms, pretty, unwritten};
 use excite::controller::{Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
-use excite::export::{Model, into_scene, write};
-use excite::robot::Prior;
+use excite::export::{Model, write};
 use excite::{Error, Result, calibrate as calibration, diagnose as diagnosis};
 use excite::{identify as identification, load as payload, signals};
 use numpy::{IntoPyArray, PyReadonlyArray1};
@@ -63,8 +62,7 @@ pub fn identify(
         let plant = terms::columns(core.plant.clone(), identify.as_deref(), &mut notes)?;
         let mut id = identification::identify(&plant, &core.records, &settings)?;
         id.warnings.splice(0..0, notes);
-        let mut robot = plant.with_values(&id.phi);
-        robot.prior = Prior::Identified;
+        let robot = id.robot(&plant);
         let model = Model {
             plant: &plant,
             robot: &robot,
@@ -87,14 +85,7 @@ pub fn identify(
                 let plant = plant.clone();
                 Arc::new(move || identification::page::html(&plant, &id, &settings))
             },
-            scene: Some(Arc::new(move |scene, folder| {
-                let model = Model {
-                    plant: &plant,
-                    robot: &robot,
-                    remarks: &[],
-                };
-                into_scene(&model, scene, folder)
-            })),
+            scene: scene(plant, robot, Vec::new()),
         })
     })
 }
@@ -196,17 +187,11 @@ pub fn diagnose(
             json,
             warnings: d.warnings.clone(),
             files,
-            scene: Some({
-                let (plant, improved) = (core.plant.clone(), d.improved.clone());
-                Arc::new(move |scene, folder| {
-                    let model = Model {
-                        plant: &plant,
-                        robot: &improved.robot,
-                        remarks: &improved.remarks,
-                    };
-                    into_scene(&model, scene, folder)
-                })
-            }),
+            scene: scene(
+                core.plant.clone(),
+                d.improved.robot.clone(),
+                d.improved.remarks.clone(),
+            ),
             page: Arc::new(move || diagnosis::page::html(&d)),
         })
     };

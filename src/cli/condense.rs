@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(
     long_about = "Reduce records to triangular factors that add, from which `excite merge` identifies: a megabyte or less \
-                  kilobytes in place of a log of any length.\n\nOne file for all records of an experiment, with those for \
+                  in place of a log of any length.\n\nOne file for all records of an experiment, with those for \
                   the fit and the holdout ones apart. Factors add where robot, columns and cut-off are the same.",
     after_help = "Examples:\n  excite condense experiment.toml --cutoff 20 --output day1.factor\n  excite condense run1.csv \
                   --robot arm.toml --period 10 --cutoff 20\n  excite merge day1.factor day2.factor"
@@ -61,18 +61,26 @@ pub fn run(args: Args) -> Result<()> {
         args.force,
     )?;
     let mut notes = Vec::new();
-    let (spec, plant, records) = match args.robot {
+    let mut experiment = match args.robot {
         Some(spec) => {
             let plant = Plant::load(&spec)?;
             let record = Record::read(&args.record, &plant, Purpose::Fit, args.period)?;
-            (spec, plant, vec![record])
+            Experiment {
+                path: args.record,
+                spec,
+                plant,
+                records: vec![record],
+            }
         }
-        None => {
-            let mut e = Experiment::read(&args.record)?;
-            e.press(outside(args.atmosphere)?)?;
-            (e.spec, e.plant, e.records)
-        }
+        None => Experiment::read(&args.record)?,
     };
+    experiment.press(outside(args.atmosphere)?)?;
+    let Experiment {
+        spec,
+        plant,
+        records,
+        ..
+    } = experiment;
     notes.extend(excite::survey::check(&plant, &records)?);
     let plant = columns(plant, args.identify.as_deref(), &mut notes)?;
     let mut settings = Settings::default();

@@ -5,7 +5,7 @@ use excite::export::{self, Model};
 use excite::identify::page;
 use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
 use excite::log::Experiment;
-use excite::robot::{JointTerm, Prior};
+use excite::robot::JointTerm;
 use excite::{Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -77,6 +77,15 @@ pub struct Args {
     json: bool,
 }
 
+/// Physical consistency by its name on the command line.
+pub(super) fn consistency(name: &str) -> Consistency {
+    match name {
+        "lmi" => Consistency::Lmi,
+        "free" => Consistency::Free,
+        _ => Consistency::Entropic,
+    }
+}
+
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let mut experiment = Experiment::read(&args.experiment)?;
@@ -91,11 +100,7 @@ pub fn run(args: Args) -> Result<()> {
             "iv" => Method::Iv,
             _ => Method::Wls,
         },
-        consistency: match args.consistency.as_str() {
-            "lmi" => Consistency::Lmi,
-            "free" => Consistency::Free,
-            _ => Consistency::Entropic,
-        },
+        consistency: consistency(&args.consistency),
         prior_strength: args.prior,
         ..Settings::default()
     };
@@ -114,13 +119,7 @@ pub fn run(args: Args) -> Result<()> {
     let plant = &experiment.plant;
     let mut id = identify(plant, &experiment.records, &settings)?;
     id.warnings.splice(0..0, notes);
-    let mut robot = plant.with_values(&id.phi);
-    // what is written comes from measurements, whatever the nominal values came from
-    robot.prior = Prior::Identified;
-    for b in &id.breakaway {
-        let own = &mut robot.joints[plant.actuated()[b.actuator]].stribeck;
-        (own.force, own.velocity) = (b.force, b.velocity);
-    }
+    let robot = id.robot(plant);
     let model = Model {
         plant,
         robot: &robot,

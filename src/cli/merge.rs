@@ -1,11 +1,10 @@
 //! `excite merge FACTOR…`.
 
-use super::identify::columns;
+use super::identify::{columns, consistency};
 use super::{Folder, into, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
-use excite::identify::{Consistency, Factor, Method, Settings, merge};
+use excite::identify::{Factor, Method, Settings, merge};
 use excite::report::format::percent;
-use excite::robot::Prior;
 use excite::{Error, Plant, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -67,11 +66,7 @@ pub fn run(args: Args) -> Result<()> {
             "ols" => Method::Ols,
             _ => Method::Wls,
         },
-        consistency: match args.consistency.as_str() {
-            "lmi" => Consistency::Lmi,
-            "free" => Consistency::Free,
-            _ => Consistency::Entropic,
-        },
+        consistency: consistency(&args.consistency),
         prior_strength: args.prior,
         ..Settings::default()
     };
@@ -81,8 +76,7 @@ pub fn run(args: Args) -> Result<()> {
     names.extend(scene.iter().map(String::as_str));
     let folder = Folder::new(&args.output, &names, args.force)?;
     let mut found = merge(&plant, factors, &settings)?;
-    let mut robot = plant.with_values(&found.phi);
-    robot.prior = Prior::Identified;
+    let robot = found.robot(&plant);
     let model = Model {
         plant: &plant,
         robot: &robot,

@@ -14,6 +14,7 @@
 //! come out of them as of the samples. One factor for each of the contiguous parts that the cross-validation of the
 //! prior leaves out in turn.
 
+use super::breakaway;
 use super::cross_validation::FOLDS;
 use super::equations::{self, Equations};
 use super::linear;
@@ -21,7 +22,7 @@ use super::method;
 use super::settings::{Method, Settings};
 use super::stack::Stack;
 use super::uncertainty;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Purpose, Record};
 use crate::plant::Plant;
 use faer::Mat;
@@ -101,6 +102,13 @@ pub fn condense(
     settings: &Settings,
 ) -> Result<Factor> {
     let mut warnings = Vec::new();
+    if !breakaway::asked(plant).is_empty() {
+        warnings.push(Warning::new(
+            WarningKind::NotIdentifiable,
+            "breakaway friction",
+            "it is asked for, but it is not linear and no factor holds it: identify it from the logs themselves",
+        ));
+    }
     let records = equations::usable(records, &mut warnings)?;
     let settings = equations::one_filter(&records, settings);
     let base = plant.base()?;

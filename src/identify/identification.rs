@@ -6,6 +6,8 @@ use super::essential::Essential;
 use super::validation::Validation;
 use crate::base::BaseParameters;
 use crate::error::Warning;
+use crate::plant::Plant;
+use crate::robot::{Prior, Robot};
 use crate::signals::Prepared;
 use faer::Mat;
 
@@ -60,4 +62,23 @@ pub struct Identification {
     pub prepared: Vec<Prepared>,
     /// everything imperfect
     pub warnings: Vec<Warning>,
+}
+
+impl Identification {
+    /// The robot that was identified: its values, its breakaway friction, and that they come from measurements.
+    pub fn robot(&self, plant: &Plant) -> Robot {
+        let mut robot = measured(plant, &self.phi);
+        for b in &self.breakaway {
+            let own = &mut robot.joints[plant.actuated()[b.actuator]].stribeck;
+            (own.force, own.velocity) = (b.force, b.velocity);
+        }
+        robot
+    }
+}
+
+/// A robot with these values. They come from measurements, whatever the nominal ones came from.
+pub(super) fn measured(plant: &Plant, phi: &[f64]) -> Robot {
+    let mut robot = plant.with_values(phi);
+    robot.prior = Prior::Identified;
+    robot
 }

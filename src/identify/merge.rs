@@ -3,6 +3,7 @@
 use super::condense::{Factor, Part};
 use super::cross_validation::Trial;
 use super::essential::{self, Essential};
+use super::identification::measured;
 use super::linear::{self, Weights};
 use super::normal::Normal;
 use super::settings::{Method, Settings};
@@ -12,6 +13,7 @@ use super::{doubts, standard, weights};
 use crate::base::BaseParameters;
 use crate::error::{Error, Result, Warning};
 use crate::plant::Plant;
+use crate::robot::Robot;
 use faer::Mat;
 use serde_json::{Value, json};
 
@@ -220,6 +222,11 @@ fn errors(stacks: &[Stack], part: &Part, pi: &[f64], joints: &[String]) -> Optio
 }
 
 impl Merged {
+    /// The robot that was identified.
+    pub fn robot(&self, plant: &Plant) -> Robot {
+        measured(plant, &self.phi)
+    }
+
     /// `merged.json`.
     pub fn json(&self, plant: &Plant) -> Value {
         let rows = |m: &Mat<f64>| -> Vec<Vec<f64>> {
