@@ -2,7 +2,7 @@
 
 use excite::mechanism::bundled::{self, Bundled};
 use excite::output::prepare_dir;
-use excite::{Error, Result, Robot};
+use excite::{Error, Plant, Result, Robot};
 use std::path::{Component, Path, PathBuf};
 
 /// Write a commented robot.toml for a URDF or a parallel robot
@@ -22,6 +22,10 @@ pub struct Args {
     /// File to write [default: standard output]; of a parallel robot the folder of robot.toml and experiment.toml [default: .]
     #[arg(short, long, value_name = "FILE.toml|DIR")]
     output: Option<PathBuf>,
+    /// Folder in which package:// meshes are looked for, before the URDF's own and
+    /// ROS_PACKAGE_PATH; may be given several times
+    #[arg(long, value_name = "FOLDER")]
+    meshes: Vec<PathBuf>,
     /// Replace files that exist
     #[arg(long)]
     force: bool,
@@ -30,6 +34,12 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let named = args.urdf.to_str().and_then(bundled::find);
     if let Some(kind) = named {
+        if !args.meshes.is_empty() {
+            return Err(Error::Argument(format!(
+                "--meshes goes with a URDF; `excite new {}` reads no meshes",
+                kind.name
+            )));
+        }
         return parallel(kind, &args);
     }
     if args.urdf.extension().is_none_or(|e| e != "urdf") {
@@ -39,9 +49,11 @@ pub fn run(args: Args) -> Result<()> {
             args.urdf.display()
         )));
     }
-    let robot = Robot::load(&args.urdf.to_string_lossy())?;
+    let mut robot = Robot::load(&args.urdf.to_string_lossy())?;
+    robot.geometry.look_in(&args.meshes);
     super::warn(&robot.warnings);
     super::warn(&robot.geometry.volumes().warnings);
+    let robot = Plant::from(&robot).lend_volumes(&robot);
     let folder = match &args.output {
         Some(file) => file.parent().map(Path::to_path_buf),
         None => standard_output().and_then(|file| file.parent().map(Path::to_path_buf)),

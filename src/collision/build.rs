@@ -2,7 +2,8 @@
 //!
 //! A pair is two volumes of different links, or a volume that moves and an obstacle. Left out are links that a
 //! joint joins, pairs that the robot file or its SRDF names, and pairs that are nearer than the margin in every
-//! one of many random postures: no motion can keep them apart. Every other pair stays, however far apart. Two links
+//! one of many random postures: no motion can keep them apart. Where volumes were fitted to meshes, tighter ones
+//! (convex hulls) are tried first. Every other pair stays, however far apart. Two links
 //! that can hardly be moved apart, as every second one of a wrist, keep half of their median distance instead of the
 //! margin.
 
@@ -10,7 +11,8 @@ use super::scene::{Balls, LeftOut, Pair, Partner, Scene, Volume, poses};
 use super::srdf;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Robot;
-use crate::robot::geometry::{Geometry, MARGIN, Obstacle};
+use crate::robot::geometry::{Geometry, MARGIN, Obstacle, Origin};
+use crate::solid::shape::MOST_VERTICES;
 use crate::solid::{Pose, Shape};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -28,6 +30,9 @@ const SLIM: f64 = 5e-3;
 const NEARLY_ALL: f64 = 0.9;
 /// They keep this part of their median distance.
 const PART: f64 = 0.5;
+/// Most hulls about a part of a link that is near another one in every posture, or of any link where no posture is
+/// free: the first number, then the second, then the third.
+const FINER: [usize; 3] = [1, 6, 16];
 /// Free postures that are kept.
 const KEPT: usize = 400;
 
@@ -40,6 +45,34 @@ pub const FLOOR: &str = "floor";
 /// # Errors
 /// An SRDF that cannot be read; no posture without contact: the pairs that are in the way.
 pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
+    let mut found = with_volumes(robot, postures);
+    let mut robot = robot.clone();
+    for most in FINER {
+        let hard: Vec<usize> = match &found {
+            Ok(None) => break,
+            Ok(Some(scene)) => {
+                let named = scene.always_near.iter().flatten();
+                named.filter_map(|n| robot.geometry.link(n)).collect()
+            }
+            Err(_) => (0..robot.geometry.links.len()).collect(),
+        };
+        let fitted = &robot.geometry.volumes().links;
+        let fitted = fitted.iter().filter(|v| v.origin == Origin::Fitted);
+        let hard: Vec<usize> = fitted
+            .map(|v| v.link)
+            .filter(|l| hard.contains(l))
+            .collect();
+        if hard.is_empty() {
+            break;
+        }
+        robot.geometry = robot.geometry.finer(&hard, most);
+        found = with_volumes(&robot, postures);
+    }
+    found
+}
+
+/// The scene with the volumes that the robot's geometry has.
+fn with_volumes(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
     let geometry = &robot.geometry;
     if geometry.is_empty() || geometry.check == Some(false) {
         return Ok(None);
@@ -54,6 +87,7 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
             .map(|l| geometry.links[*l].name.clone())
             .collect(),
         warnings: found.warnings.clone(),
+        fitted: found.clone(),
         ..Scene::default()
     };
     for link in &found.links {
@@ -159,7 +193,7 @@ impl Scene {
     /// stands on it.
     fn floor(&mut self, geometry: &Geometry) {
         let lowest = |v: &Volume| {
-            let mut corners = [Vector3::zeros(); 8];
+            let mut corners = [Vector3::zeros(); MOST_VERTICES];
             let k = v.shape.core(&Pose::identity(), &mut corners);
             let z = corners[..k]
                 .iter()

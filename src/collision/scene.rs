@@ -5,6 +5,7 @@
 
 use crate::error::Warning;
 pub use crate::robot::geometry::Obstacle;
+use crate::robot::geometry::Volumes;
 use crate::robot::{Motion, Robot};
 use crate::solid::distance::{Separation, separation, separation_from_plane};
 use crate::solid::shape::{Pose, Shape};
@@ -73,6 +74,8 @@ pub struct Scene {
     pub free: Vec<Vec<f64>>,
     /// what was imperfect
     pub warnings: Vec<Warning>,
+    /// volumes of all links, as the scene has them
+    pub fitted: Volumes,
 }
 
 /// Balls about all volumes and solid obstacles of a scene: a quick lower bound of any distance.
@@ -201,9 +204,9 @@ impl Scene {
         near - far
     }
 
-    /// Whether the exact distance of a pair takes an iteration: one of the two is a box.
+    /// Whether the exact distance of a pair takes an iteration: one of the two is a box or a hull.
     pub fn iterates(&self, pair: &Pair) -> bool {
-        let boxed = |s: &Shape| matches!(s, Shape::Box { .. });
+        let boxed = |s: &Shape| matches!(s, Shape::Box { .. } | Shape::Hull(_));
         let other = match pair.partner {
             Partner::Volume(v) => boxed(&self.volumes[v].shape),
             Partner::Obstacle(o) => match &self.obstacles[o] {

@@ -24,7 +24,10 @@ impl Format for RobotToml {
 
     fn write(&self, model: &Model) -> Result<String> {
         let mut out = match model.plant.mechanism() {
-            None => model.robot.to_toml_template(urdf::FILE),
+            None => {
+                let robot = model.plant.lend_volumes(model.robot);
+                robot.to_toml_template(urdf::FILE)
+            }
             Some(m) => mechanism::toml(m, model.robot, urdf::FILE)?,
         };
         let lines = remark::lines(model.remarks, self);

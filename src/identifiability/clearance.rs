@@ -46,7 +46,7 @@ impl Clearances {
         motion: &Samples,
     ) -> Result<Self> {
         let geometry = &plant.robot().geometry;
-        let volumes = geometry.volumes().links.iter().map(|v| LinkVolumes {
+        let volumes = scene.fitted.links.iter().map(|v| LinkVolumes {
             link: geometry.links[v.link].name.clone(),
             shapes: v.shapes.len(),
             origin: v.origin,

@@ -86,6 +86,18 @@ impl Plant {
         Ok(self.scene.get_or_init(|| found).clone())
     }
 
+    /// A robot of the same links with the volumes of this one's [`Plant::scene`], which can be tighter than those of its
+    /// geometry alone. As it is where there is no scene, or none can be had.
+    #[doc(hidden)]
+    pub fn lend_volumes(&self, robot: &Robot) -> Robot {
+        let mut robot = robot.clone();
+        let fits = !robot.geometry.parts.is_empty();
+        if let Some(scene) = fits.then(|| self.scene().ok().flatten()).flatten() {
+            robot.geometry = robot.geometry.with_volumes(scene.fitted.clone());
+        }
+        robot
+    }
+
     /// Why there is no [`Plant::scene`] although the robot's files say something of volumes or surroundings.
     pub fn scene_warnings(&self) -> Vec<Warning> {
         let geometry = &self.robot.geometry;

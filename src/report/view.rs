@@ -73,6 +73,13 @@ pub enum Solid {
         /// half edge lengths
         half: Point,
     },
+    /// convex hull
+    Hull {
+        /// corners
+        points: Vec<Point>,
+        /// triangles: indices of corners, counter-clockwise seen from outside
+        faces: Vec<[usize; 3]>,
+    },
 }
 
 /// A volume of a link.

@@ -12,11 +12,12 @@
 //! exact derivative where the nearest points are unique.
 //!
 //! Two points or segments are solved in closed form (Ericson, Real-Time Collision Detection, 2005, sec.
-//! 5.1.9); boxes by the nearest point to the origin of the Minkowski difference (Gilbert, Johnson &
+//! 5.1.9); boxes and hulls by the nearest point to the origin of the Minkowski difference (Gilbert, Johnson &
 //! Keerthi, IEEE J. Robotics and Automation 4, 1988), with the separating axes of the two polytopes
-//! where the cores overlap.
+//! where the cores overlap. Of hulls only the normals of the faces are tried there, so that the depth of an overlap
+//! may be stated too large; that there is one is exact.
 
-use super::shape::{Pose, Shape};
+use super::shape::{MOST_VERTICES, Pose, Shape};
 use nalgebra::Vector3;
 
 type V = Vector3<f64>;
@@ -36,7 +37,7 @@ pub struct Separation {
 
 /// Separation of shape `a` on a body at `at_a` and shape `b` on a body at `at_b`, in the frame of both poses.
 pub fn separation(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> Separation {
-    let (mut va, mut vb) = ([V::zeros(); 8], [V::zeros(); 8]);
+    let (mut va, mut vb) = ([V::zeros(); MOST_VERTICES], [V::zeros(); MOST_VERTICES]);
     let (ka, kb) = (a.core(at_a, &mut va), b.core(at_b, &mut vb));
     let (va, vb) = (&va[..ka], &vb[..kb]);
     let (p, q) = match (ka, kb) {
@@ -56,7 +57,7 @@ pub fn separation(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> Separation 
             normal: n,
         };
     }
-    let (depth, n) = overlap(va, vb);
+    let (depth, n) = overlap((a, at_a, va), (b, at_b, vb));
     let p = match depth > 0.0 {
         true => contact(va, vb, &n),
         false => p,
@@ -69,9 +70,15 @@ pub fn separation(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> Separation 
     }
 }
 
+/// Distance of a point from the convex hull of some others; 0 inside.
+pub(super) fn from_point(hull: &[V], p: &V) -> f64 {
+    let (a, b) = gjk(&[*p], hull);
+    (b - a).norm()
+}
+
 /// Separation of a shape and the half-space `normalᵀ x ≤ offset` (floor, wall), the shape being the first.
 pub fn separation_from_plane(a: &Shape, at: &Pose, normal: &V, offset: f64) -> Separation {
-    let mut v = [V::zeros(); 8];
+    let mut v = [V::zeros(); MOST_VERTICES];
     let k = a.core(at, &mut v);
     let deepest = v[..k]
         .iter()
@@ -281,20 +288,28 @@ fn projection(s: &[Vertex], kept: &[usize]) -> Option<[f64; 4]> {
     weights[..=n].iter().all(|w| *w >= 0.0).then_some(weights)
 }
 
+/// A shape, the pose of its body and the vertices of its core there.
+type Placed<'a> = (&'a Shape, &'a Pose, &'a [V]);
+
 /// Least translation of `B` that parts two overlapping cores: its length and its direction, over the
 /// separating axes of two polytopes (face normals and products of edges).
-fn overlap(va: &[V], vb: &[V]) -> (f64, V) {
-    let edges = |v: &[V]| -> Vec<V> {
-        match v.len() {
-            2 => vec![v[1] - v[0]],
-            8 => vec![v[1] - v[0], v[2] - v[0], v[4] - v[0]],
-            _ => vec![],
+fn overlap((a, at_a, va): Placed, (b, at_b, vb): Placed) -> (f64, V) {
+    let edges = |shape: &Shape, v: &[V]| -> Vec<V> {
+        match shape {
+            Shape::Sphere { .. } | Shape::Hull(_) => vec![],
+            Shape::Capsule { .. } => vec![v[1] - v[0]],
+            Shape::Box { .. } => vec![v[1] - v[0], v[2] - v[0], v[4] - v[0]],
         }
     };
-    let (ea, eb) = (edges(va), edges(vb));
+    let (ea, eb) = (edges(a, va), edges(b, vb));
     let mut axes: Vec<V> = Vec::new();
     // a box has its faces across its edges; flat cores have any axis across them
     axes.extend(ea.iter().chain(&eb));
+    for (shape, at) in [(a, at_a), (b, at_b)] {
+        if let Shape::Hull(h) = shape {
+            axes.extend(h.normals().map(|n| at.rotation * n));
+        }
+    }
     for (i, a) in ea.iter().enumerate() {
         axes.extend(eb.iter().map(|b| a.cross(b)));
         axes.extend(ea[i + 1..].iter().map(|b| a.cross(b)));
@@ -302,7 +317,7 @@ fn overlap(va: &[V], vb: &[V]) -> (f64, V) {
     for (i, a) in eb.iter().enumerate() {
         axes.extend(eb[i + 1..].iter().map(|b| a.cross(b)));
     }
-    if va.len() < 8 && vb.len() < 8 {
+    if va.len() <= 2 && vb.len() <= 2 {
         // points and segments meet in a point: any direction across them parts them at once
         let across = match (ea.first(), eb.first()) {
             (Some(a), Some(b)) => a.cross(b),

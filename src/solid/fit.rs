@@ -13,10 +13,11 @@
 //! triangles are split across the axes of the part and each part gets its own. A part that a box encloses much
 //! more tightly than a capsule gets the box.
 
-use super::hull::hull;
+use super::hull::{Hull, hull};
 use super::mesh::Mesh;
-use super::shape::{Pose, Shape};
+use super::shape::{MOST_VERTICES, Pose, Shape};
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 type V = Vector3<f64>;
@@ -39,35 +40,29 @@ pub struct Fit {
 
 /// Encloses a mesh by at most `most` shapes, until their volume is below `enough` times that of the hull.
 pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
-    let whole = match mesh.points.len() > 20 * MANY {
-        true => hull_of(mesh, &extremes(&mesh.points)),
-        false => hull(&mesh.points),
-    };
+    let whole = whole(mesh);
     let cut = subdivided(mesh);
     let original = mesh;
     let mesh = &cut;
     let hull_volume = whole.as_ref().map_or(0.0, |h| h.volume);
     let all: Vec<usize> = (0..mesh.triangles.len()).collect();
     let mut parts: Vec<Part> = vec![(all.clone(), enclose(mesh, &all))];
+    // the best way to split each part, found once and only where it is needed
+    let mut ways: Vec<Option<Split>> = Vec::new();
     let mut best = parts.clone();
     let mut volume = union_volume(&shapes(&best));
     while volume > enough * hull_volume && parts.len() < most.max(1) {
+        ways.extend(parts[ways.len()..].iter().map(|part| split(mesh, part)));
         // the part whose split saves most
-        let mut choice: Option<(f64, usize, [Part; 2])> = None;
-        for (i, (triangles, shape)) in parts.iter().enumerate() {
-            for split in splits(mesh, triangles) {
-                let halves = split.map(|t| {
-                    let c = enclose(mesh, &t);
-                    (t, c)
-                });
-                let saved = shape.volume() - halves.iter().map(|h| h.1.volume()).sum::<f64>();
-                if choice.as_ref().is_none_or(|c| saved > c.0) {
-                    choice = Some((saved, i, halves));
-                }
-            }
-        }
-        let Some((_, i, halves)) = choice else { break };
+        let saving = |i: &usize| ways[*i].as_ref().map_or(f64::NEG_INFINITY, |w| w.0);
+        let choice = (0..parts.len())
+            .rev()
+            .max_by(|a, b| saving(a).total_cmp(&saving(b)));
+        let Some((i, (_, halves))) = choice.and_then(|i| Some((i, ways[i].take()?))) else {
+            break;
+        };
         parts.remove(i);
+        ways.remove(i);
         parts.extend(halves);
         let now = union_volume(&shapes(&parts));
         if now < volume {
@@ -75,21 +70,37 @@ pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
             best.clone_from(&parts);
         }
     }
-    let shapes = shapes(&best);
-    let protrusion = match &whole {
-        Some(h) => protrusion(&shapes, original, h),
-        None => shapes.iter().map(Shape::radius).fold(0.0, f64::max),
-    };
+    of(original, whole, shapes(&best), volume)
+}
+
+/// The hull of a mesh, of its outermost points where there are very many.
+fn whole(mesh: &Mesh) -> Option<Hull> {
+    match mesh.points.len() > 20 * MANY {
+        true => hull_of(mesh, &extremes(&mesh.points)),
+        false => hull(&mesh.points),
+    }
+}
+
+/// Shapes about a mesh beside its hull.
+pub(super) fn judged(mesh: &Mesh, shapes: Vec<Shape>) -> Fit {
+    let volume = union_volume(&shapes);
+    of(mesh, whole(mesh), shapes, volume)
+}
+
+fn of(mesh: &Mesh, whole: Option<Hull>, shapes: Vec<Shape>, volume: f64) -> Fit {
     Fit {
+        protrusion: match &whole {
+            Some(h) => protrusion(&shapes, mesh, h),
+            None => shapes.iter().map(Shape::radius).fold(0.0, f64::max),
+        },
         shapes,
         volume,
-        hull: hull_volume,
-        protrusion,
+        hull: whole.map_or(0.0, |h| h.volume),
     }
 }
 
 /// Hull of some of the points, with their indices in the mesh.
-fn hull_of(mesh: &Mesh, some: &[V]) -> Option<super::hull::Hull> {
+fn hull_of(mesh: &Mesh, some: &[V]) -> Option<Hull> {
     let mut found = hull(some)?;
     let index = |p: &V| mesh.points.iter().position(|q| q == p).unwrap_or(0);
     let place: Vec<usize> = some.iter().map(index).collect();
@@ -105,12 +116,32 @@ fn hull_of(mesh: &Mesh, some: &[V]) -> Option<super::hull::Hull> {
 /// Triangles and the shape that holds them.
 type Part = (Vec<usize>, Shape);
 
+/// What a split saves, m³, and its halves.
+type Split = (f64, [Part; 2]);
+
+/// The way to part a part in two that saves most.
+fn split(mesh: &Mesh, (triangles, shape): &Part) -> Option<Split> {
+    let halves = splits(mesh, triangles).into_par_iter().map(|split| {
+        let halves = split.map(|t| {
+            let c = enclose(mesh, &t);
+            (t, c)
+        });
+        let saved = shape.volume() - halves.iter().map(|h| h.1.volume()).sum::<f64>();
+        (saved, halves)
+    });
+    let all: Vec<Split> = halves.collect();
+    // the first of equals
+    let mut all = all.into_iter().rev();
+    let first = all.next()?;
+    Some(all.fold(first, |best, s| if s.0 >= best.0 { s } else { best }))
+}
+
 /// A box stands for a part where its volume is less than this part of the capsule's.
 const BOX: f64 = 0.75;
 
 /// The same surface with no edge longer than an eighth of the mesh's size, so that it can be split anywhere;
 /// a mesh that is fine enough already, or very large, stays as it is.
-fn subdivided(mesh: &Mesh) -> Mesh {
+pub(super) fn subdivided(mesh: &Mesh) -> Mesh {
     let [lo, hi] = mesh.bounds();
     let longest = (hi - lo).norm() / 8.0;
     let mut out = Mesh {
@@ -165,7 +196,7 @@ impl Capsule {
 }
 
 /// Corners of these triangles, or those of their hull where it has a volume.
-fn corners(mesh: &Mesh, triangles: &[usize]) -> Vec<V> {
+pub(super) fn corners(mesh: &Mesh, triangles: &[usize]) -> Vec<V> {
     let mut used: Vec<usize> = triangles.iter().flat_map(|t| mesh.triangles[*t]).collect();
     used.sort_unstable();
     used.dedup();
@@ -207,7 +238,7 @@ fn extremes(points: &[V]) -> Vec<V> {
 }
 
 /// The smallest shape found about these triangles.
-fn enclose(mesh: &Mesh, triangles: &[usize]) -> Shape {
+pub(super) fn enclose(mesh: &Mesh, triangles: &[usize]) -> Shape {
     let found = search(mesh, triangles);
     // those that were not searched with, and rounding
     let over = triangles
@@ -230,6 +261,7 @@ fn enclose(mesh: &Mesh, triangles: &[usize]) -> Shape {
             centre,
             radius: radius + more,
         },
+        hull @ Shape::Hull(_) => hull,
     }
 }
 
@@ -407,7 +439,7 @@ fn half_sphere(k: usize, n: usize) -> V {
     V::new(r * angle.cos(), r * angle.sin(), z)
 }
 
-fn principal_axes(points: &[V]) -> [V; 3] {
+pub(super) fn principal_axes(points: &[V]) -> [V; 3] {
     let n = points.len().max(1) as f64;
     let mean = points.iter().sum::<V>() / n;
     let scatter: Matrix3<f64> = points
@@ -473,7 +505,7 @@ fn three(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> ([f64; 2], f64) {
 }
 
 /// Ways to part triangles in two: across each principal axis, at a few places.
-fn splits(mesh: &Mesh, triangles: &[usize]) -> Vec<[Vec<usize>; 2]> {
+pub(super) fn splits(mesh: &Mesh, triangles: &[usize]) -> Vec<[Vec<usize>; 2]> {
     let middle = |t: &usize| {
         mesh.triangles[*t]
             .iter()
@@ -515,7 +547,7 @@ pub fn union_volume(shapes: &[Shape]) -> f64 {
     }
     let (mut lo, mut hi) = (V::repeat(f64::INFINITY), V::repeat(f64::NEG_INFINITY));
     for s in shapes {
-        let mut v = [V::zeros(); 8];
+        let mut v = [V::zeros(); MOST_VERTICES];
         let k = s.core(&Pose::identity(), &mut v);
         for p in &v[..k] {
             lo = lo.inf(&(p - V::repeat(s.radius())));
@@ -544,19 +576,24 @@ pub fn union_volume(shapes: &[Shape]) -> f64 {
 }
 
 /// Furthest point of the capsules' surface above the faces of the hull, over a grid of surface points.
-fn protrusion(shapes: &[Shape], mesh: &Mesh, hull: &super::hull::Hull) -> f64 {
+fn protrusion(shapes: &[Shape], mesh: &Mesh, hull: &Hull) -> f64 {
+    let [lo, hi] = mesh.bounds();
+    let rounding = 1e-4 * (hi - lo).norm();
     let planes: Vec<(V, f64)> = hull
         .faces
         .iter()
         .filter_map(|f| {
             let [a, b, c] = f.map(|i| mesh.points[i]);
             let n = (b - a).cross(&(c - a)).try_normalize(1e-300)?;
-            Some((n, n.dot(&a)))
+            let offset = n.dot(&a);
+            // the normal of a sliver is made of rounding
+            let below = |i: &usize| n.dot(&mesh.points[*i]) - offset <= rounding;
+            hull.corners.iter().all(below).then_some((n, offset))
         })
         .collect();
     let mut most: f64 = 0.0;
     for s in shapes {
-        let mut v = [V::zeros(); 8];
+        let mut v = [V::zeros(); MOST_VERTICES];
         let k = s.core(&Pose::identity(), &mut v);
         for end in &v[..k] {
             for d in 0..400 {

@@ -1,4 +1,8 @@
 //! Convex hull of points in space (Barber, Dobkin & Huhdanpaa, ACM TOMS 22(4), 1996).
+//!
+//! Meshes hold many corners that lie in a plane up to rounding, which can lead the construction astray. So a hull is
+//! verified: it is closed, and no point lies above one of its faces. Where it fails, the points are moved by a little at
+//! random and the hull of those is taken, as Qhull does under the name "joggle".
 
 use nalgebra::Vector3;
 
@@ -42,10 +46,49 @@ impl Face {
     }
 }
 
+/// By how much of their size points are moved, in this order until a hull is sound.
+const JOGGLES: [f64; 5] = [0.0, 1e-8, 1e-7, 1e-6, 1e-5];
+
 /// The hull of the points; `None` where they lie in a plane, or are fewer than four.
 pub fn hull(points: &[V]) -> Option<Hull> {
     let size = points.iter().map(|p| p.amax()).fold(0.0, f64::max);
     let eps = 1e-10 * size.max(1e-300);
+    simplex(points, eps)?;
+    let mut state = 1_u64;
+    let mut share = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    JOGGLES.iter().find_map(|by| {
+        let by = by * size;
+        let moved: Vec<V> = (points.iter())
+            .map(|p| p + V::new(share(), share(), share()) * by)
+            .collect();
+        quick(&moved, eps).filter(|h| h.sound(&moved, 1e-9 * size))
+    })
+}
+
+impl Hull {
+    /// Whether every edge has two faces, one in each direction, and no point lies higher above a face than this.
+    fn sound(&self, points: &[V], most: f64) -> bool {
+        let mut edges = std::collections::BTreeSet::new();
+        let once = self.faces.iter().all(|[a, b, c]| {
+            [(a, b), (b, c), (c, a)]
+                .into_iter()
+                .all(|e| edges.insert(e))
+        });
+        let closed = || edges.iter().all(|(a, b)| edges.contains(&(*b, *a)));
+        let planes = || self.faces.iter().map(|f| Face::new(points, *f));
+        once && closed()
+            && planes().all(|f| points.iter().all(|p| f.height(p) <= most))
+            && self.volume > 0.0
+    }
+}
+
+/// The hull by adding the point that lies highest above a face, as long as there is one.
+fn quick(points: &[V], eps: f64) -> Option<Hull> {
     let start = simplex(points, eps)?;
     let centre = start.iter().map(|i| points[*i]).sum::<V>() / 4.0;
     let mut faces: Vec<Face> = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]

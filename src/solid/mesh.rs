@@ -1,6 +1,6 @@
-//! Triangles of a link's geometry, from STL (binary or text) and OBJ files.
+//! Triangles of a link's geometry, from STL (binary or text), OBJ and COLLADA files.
 //!
-//! Only positions are read. Lengths are those of the file; the caller scales them to m.
+//! Only positions are read. Lengths are those of the file (COLLADA: m); the caller scales them to m.
 
 use nalgebra::Vector3;
 
@@ -28,9 +28,10 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
     let mesh = match ending.as_str() {
         "stl" => stl(bytes)?,
         "obj" => obj(bytes)?,
+        "dae" => super::dae::dae(bytes)?,
         _ => {
             return Err(format!(
-                "a mesh of kind .{ending} is not read; convert it to STL or OBJ"
+                "a mesh of kind .{ending} is not read; convert it to STL, OBJ or DAE"
             ));
         }
     };
@@ -141,13 +142,17 @@ fn point<'a>(
 
 /// Joins equal points.
 #[derive(Default)]
-struct Builder {
-    mesh: Mesh,
+pub(super) struct Builder {
+    pub(super) mesh: Mesh,
     known: std::collections::HashMap<[u64; 3], usize>,
 }
 
 impl Builder {
-    fn triangle(&mut self, corners: [V; 3], place: impl Fn() -> String) -> Result<(), String> {
+    pub(super) fn triangle(
+        &mut self,
+        corners: [V; 3],
+        place: impl Fn() -> String,
+    ) -> Result<(), String> {
         if !corners.iter().all(|c| c.iter().all(|x| x.is_finite())) {
             return Err(format!("{}: a number that is not finite", place()));
         }

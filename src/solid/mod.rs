@@ -5,12 +5,16 @@
 //! | [`shape`] | sphere, capsule, box: a convex core swept by a radius |
 //! | [`distance`] | signed distance of two shapes, witness points and normal |
 //! | [`mesh`] | triangles from STL and OBJ files |
+//! | [`dae`] | triangles from COLLADA files |
 //! | [`hull`] | convex hull of points, its volume |
 //! | [`fit`] | capsules and boxes that enclose a mesh |
+//! | [`hulls`] | hulls of few corners that enclose a mesh |
 
+pub mod dae;
 pub mod distance;
 pub mod fit;
 pub mod hull;
+pub mod hulls;
 pub mod mesh;
 pub mod shape;
 

@@ -1,13 +1,22 @@
-//! Convex volumes: a core (point, segment or box) swept by a ball of radius `r`.
+//! Convex volumes: a core (point, segment, box or hull) swept by a ball of radius `r`.
 //!
 //! ```text
-//! S = { c + r u : c ∈ conv{v_1 … v_k}, |u| ≤ 1 }       k = 1 sphere, 2 capsule, 8 box
+//! S = { c + r u : c ∈ conv{v_1 … v_k}, |u| ≤ 1 }       k = 1 sphere, 2 capsule, 8 box,
+//!                                                      4 to 32 hull
 //! ```
 //!
 //! All lengths in m. Vertices are in the frame of the body that carries the shape.
 
+use super::distance;
+use super::hull::hull;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Most vertices of a core.
+pub const MOST_VERTICES: usize = 32;
+/// Room for the vertices of a core.
+pub type Core = [Vector3<f64>; MOST_VERTICES];
 
 /// Pose of a frame `F` in a frame `W`: `p_W = rotation · p_F + position`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,19 +85,71 @@ pub enum Shape {
         /// half edge lengths
         half: Vector3<f64>,
     },
+    /// convex hull of points swept by a ball; made by [`Shape::hull`]
+    Hull(Polytope),
+}
+
+/// A convex hull of points, swept by a ball.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polytope {
+    /// corners, 4 to [`MOST_VERTICES`]
+    pub points: Arc<[Vector3<f64>]>,
+    /// radius
+    pub radius: f64,
+    /// outward unit normals and offsets `nᵀ x` of the faces of the core
+    faces: Arc<[(Vector3<f64>, f64)]>,
+    /// of the swept core, an edge's share left out, m³
+    volume: f64,
+}
+
+impl Polytope {
+    /// Outward unit normals of the faces of the core.
+    pub fn normals(&self) -> impl Iterator<Item = &Vector3<f64>> {
+        self.faces.iter().map(|f| &f.0)
+    }
+
+    /// The mean of the corners.
+    pub fn centre(&self) -> Vector3<f64> {
+        self.points.iter().sum::<Vector3<f64>>() / self.points.len() as f64
+    }
 }
 
 impl Shape {
+    /// The convex hull of points, swept by a ball. `None` where they lie in a plane, or more than [`MOST_VERTICES`] of them
+    /// are corners.
+    pub fn hull(points: &[Vector3<f64>], radius: f64) -> Option<Shape> {
+        let found = hull(points)?;
+        if found.corners.len() > MOST_VERTICES {
+            return None;
+        }
+        let mut area = 0.0;
+        let faces = found.faces.iter().filter_map(|f| {
+            let [a, b, c] = f.map(|i| points[i]);
+            let across = (b - a).cross(&(c - a));
+            area += 0.5 * across.norm();
+            let n = across.try_normalize(1e-300)?;
+            Some((n, n.dot(&a)))
+        });
+        let faces = faces.collect();
+        Some(Shape::Hull(Polytope {
+            points: found.corners.iter().map(|i| points[*i]).collect(),
+            radius,
+            faces,
+            volume: found.volume + radius * (area + 4.0 / 3.0 * PI * radius * radius),
+        }))
+    }
+
     /// Radius that sweeps the core.
     pub fn radius(&self) -> f64 {
         match self {
             Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => *radius,
             Shape::Box { .. } => 0.0,
+            Shape::Hull(h) => h.radius,
         }
     }
 
     /// Vertices of the core in the frame `W` in which the body has pose `body`; returns how many.
-    pub fn core(&self, body: &Pose, out: &mut [Vector3<f64>; 8]) -> usize {
+    pub fn core(&self, body: &Pose, out: &mut Core) -> usize {
         match self {
             Shape::Sphere { centre, .. } => {
                 out[0] = body.apply(centre);
@@ -101,13 +162,19 @@ impl Shape {
             }
             Shape::Box { pose, half } => {
                 let at = body.then(pose);
-                for (i, v) in out.iter_mut().enumerate() {
+                for (i, v) in out.iter_mut().take(8).enumerate() {
                     let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
                     let corner =
                         Vector3::new(sign(0) * half[0], sign(1) * half[1], sign(2) * half[2]);
                     *v = at.apply(&corner);
                 }
                 8
+            }
+            Shape::Hull(h) => {
+                for (v, p) in out.iter_mut().zip(h.points.iter()) {
+                    *v = body.apply(p);
+                }
+                h.points.len()
             }
         }
     }
@@ -122,6 +189,7 @@ impl Shape {
                 radius: r,
             } => PI * r * r * (to - from).norm() + 4.0 / 3.0 * PI * r.powi(3),
             Shape::Box { half, .. } => 8.0 * half[0] * half[1] * half[2],
+            Shape::Hull(h) => h.volume,
         }
     }
 
@@ -137,6 +205,14 @@ impl Shape {
                 let over = local.abs() - half;
                 let outside = over.map(|x| x.max(0.0)).norm();
                 outside + over.max().min(0.0)
+            }
+            Shape::Hull(h) => {
+                let heights = h.faces.iter().map(|(n, o)| n.dot(p) - o);
+                let highest = heights.fold(f64::NEG_INFINITY, f64::max);
+                match highest > 0.0 {
+                    true => distance::from_point(&h.points, p) - h.radius,
+                    false => highest - h.radius,
+                }
             }
         }
     }
@@ -155,6 +231,16 @@ impl Shape {
                 let reach = local.abs().dot(half);
                 [middle - reach, middle + reach]
             }
+            Shape::Hull(h) => {
+                let local = body.rotation.tr_mul(n);
+                let origin = n.dot(&body.position);
+                let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+                for p in h.points.iter() {
+                    let x = origin + local.dot(p);
+                    range = [range[0].min(x), range[1].max(x)];
+                }
+                range
+            }
         };
         [low - self.radius(), high + self.radius()]
     }
@@ -167,12 +253,17 @@ impl Shape {
                 ((from + to) * 0.5, 0.5 * (to - from).norm() + radius)
             }
             Shape::Box { pose, half } => (pose.position, half.norm()),
+            Shape::Hull(h) => {
+                let centre = h.centre();
+                let far = h.points.iter().map(|p| (p - centre).norm());
+                (centre, far.fold(0.0, f64::max) + h.radius)
+            }
         }
     }
 
     /// Radius of the ball about the body's origin that holds the shape, m.
     pub fn reach(&self) -> f64 {
-        let mut v = [Vector3::zeros(); 8];
+        let mut v = [Vector3::zeros(); MOST_VERTICES];
         let k = self.core(&Pose::identity(), &mut v);
         v[..k].iter().map(|p| p.norm()).fold(0.0, f64::max) + self.radius()
     }
@@ -210,6 +301,16 @@ impl Shape {
                 pose: by.then(pose),
                 half: *half,
             },
+            Shape::Hull(h) => Shape::Hull(Polytope {
+                points: h.points.iter().map(|p| by.apply(p)).collect(),
+                faces: (h.faces.iter())
+                    .map(|(n, o)| {
+                        let n = by.rotation * n;
+                        (n, o + n.dot(&by.position))
+                    })
+                    .collect(),
+                ..h.clone()
+            }),
         }
     }
 }

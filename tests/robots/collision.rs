@@ -3,7 +3,7 @@
 use excite::collision::clearance::{Fineness, Path, clearances};
 use excite::collision::scene::{Balls, Obstacle, Pair, Partner, Scene, Volume, poses};
 use excite::robot::{Body, Inertia, Joint, Motion, Robot};
-use excite::solid::{Pose, Shape, fit, hull, mesh, separation};
+use excite::solid::{Pose, Shape, fit, hull, hulls, mesh, separation};
 use nalgebra::{Rotation3, Vector3};
 
 type V = Vector3<f64>;
@@ -38,10 +38,19 @@ impl Random {
                 to: self.vector(0.3),
                 radius: 0.05 + 0.04 * self.next(),
             },
-            _ => Shape::Box {
+            2 => Shape::Box {
                 pose: self.pose(0.2),
                 half: self.vector(0.1).abs() + V::repeat(0.05),
             },
+            _ => {
+                let centre = self.vector(0.2);
+                let count = 4 + (self.next().abs() * 28.0) as usize;
+                let points: Vec<V> = (0..count)
+                    .map(|_| centre + self.vector(1.0).normalize() * 0.15)
+                    .collect();
+                let radius = 0.01 * self.next().max(0.0);
+                Shape::hull(&points, radius).unwrap_or_else(|| self.shape(3))
+            }
         }
     }
 }
@@ -59,6 +68,7 @@ fn brute(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> f64 {
             );
             at.apply(&pose.apply(&local))
         }
+        Shape::Hull(_) => unreachable!("hulls have a test of their own"),
     };
     let mut x = [0.5; 6];
     let value = |x: &[f64; 6]| {
@@ -399,6 +409,125 @@ fn a_fit_holds_every_corner_and_is_tight() {
     assert!(f.volume < 1.7 * f.hull, "{}", f.volume / f.hull);
 }
 
+/// Corners of fine meshes lie in a plane up to the rounding of the file.
+#[test]
+fn hulls_of_finely_meshed_flats_are_sound() {
+    let mut r = Random(5);
+    for k in 0..40 {
+        let turn = r.pose(0.1);
+        let round = |p: V| turn.apply(&p).map(|x| f64::from(x as f32));
+        let steps = 6 + k % 12;
+        let grid = |i: usize| 2.0 * i as f64 / steps as f64 - 1.0;
+        let half = V::new(0.1, 0.07, 0.15);
+        let mut points = Vec::new();
+        for (a, b) in (0..=steps).flat_map(|a| (0..=steps).map(move |b| (a, b))) {
+            for (axis, side) in (0..3).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
+                let mut p = V::zeros();
+                p[axis] = side;
+                p[(axis + 1) % 3] = grid(a);
+                p[(axis + 2) % 3] = grid(b);
+                points.push(round(p.component_mul(&half)));
+            }
+        }
+        let h = hull::hull(&points).expect("a volume");
+        let volume = 8.0 * half.x * half.y * half.z;
+        assert!((h.volume / volume - 1.0).abs() < 1e-4, "{k}: {}", h.volume);
+        // the corners of the box are corners of the hull
+        for sign in 0..8 {
+            let side = |bit: usize| if sign >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let corner = round(V::new(side(0) * half.x, side(1) * half.y, side(2) * half.z));
+            let near = |i: &usize| (points[*i] - corner).norm() < 1e-5;
+            assert!(h.corners.iter().any(near), "{k} {sign}");
+        }
+    }
+}
+
+/// The plane across the normal parts the two by exactly the distance: no two points of them can be nearer.
+#[test]
+fn distances_of_hulls_are_certified_by_a_plane() {
+    let mut r = Random(23);
+    let (mut apart, mut met) = (0, 0);
+    for k in 0..20_000 {
+        let (a, b) = (r.shape(3), r.shape(k % 4));
+        let (pa, pb) = (r.pose(0.25), r.pose(0.25));
+        for (a, pa, b, pb) in [(&a, &pa, &b, &pb), (&b, &pb, &a, &pa)] {
+            let s = separation(a, pa, b, pb);
+            let gap = b.extent(pb, &s.normal)[0] - a.extent(pa, &s.normal)[1];
+            let rounded = a.radius() + b.radius();
+            if s.distance + rounded > 1e-6 {
+                apart += 1;
+                assert!((gap - s.distance).abs() < 1e-9, "{k}: {} {gap}", s.distance);
+                assert!((s.on_second - s.on_first - s.normal * s.distance).norm() < 1e-9);
+                for (shape, at, p) in [(a, pa, s.on_first), (b, pb, s.on_second)] {
+                    let local = at.rotation.transpose() * (p - at.position);
+                    assert!(shape.signed_distance(&local).abs() < 1e-8, "{k}");
+                }
+            } else if s.distance + rounded < -1e-6 {
+                met += 1;
+                // the depth stated is enough to part them
+                assert!((gap - s.distance).abs() < 1e-9, "{k}: {} {gap}", s.distance);
+                let away = Pose {
+                    position: pb.position + s.normal * (1e-6 - s.distance),
+                    ..*pb
+                };
+                let after = separation(a, pa, b, &away).distance;
+                assert!(after >= -1e-9, "{k}: {after}");
+            }
+        }
+    }
+    assert!(apart > 5000 && met > 2000, "{apart} {met}");
+}
+
+/// A prism of 48 sides about a cylinder of radius 0.1 m along z, 0.3 m long.
+fn drum() -> mesh::Mesh {
+    let mut m = mesh::Mesh::default();
+    for z in [-0.15, 0.15] {
+        for k in 0..48 {
+            let (s, c) = (f64::from(k) * std::f64::consts::TAU / 48.0).sin_cos();
+            m.points.push(V::new(0.1 * c, 0.1 * s, z));
+        }
+    }
+    for k in 0..48 {
+        let n = (k + 1) % 48;
+        m.triangles
+            .extend([[k, n, 48 + k], [n, 48 + n, 48 + k], [0, n, k]]);
+        m.triangles.push([48, 48 + k, 48 + n]);
+    }
+    m
+}
+
+#[test]
+fn hulls_hold_a_mesh_and_lie_close_to_it() {
+    let drum = drum();
+    let one = hulls::hulls(&drum, 1);
+    assert_eq!(one.shapes.len(), 1);
+    // a capsule about it reaches far beyond the flat ends
+    assert!(one.volume < 1.1 * one.hull, "{}", one.volume / one.hull);
+    assert!(one.protrusion < 3e-3, "{}", one.protrusion);
+    assert!(fit::fit(&drum, 1, 1.0).protrusion > 5.0 * one.protrusion);
+    // a cross of two drums is hollow between its arms
+    let mut cross = drum.clone();
+    let turned = drum.points.iter().map(|p| V::new(p.z * 3.0, p.y, p.x));
+    cross.points.extend(turned);
+    let moved = drum.triangles.iter().map(|t| t.map(|i| i + 96));
+    cross.triangles.extend(moved);
+    let (one, more) = (hulls::hulls(&cross, 1), hulls::hulls(&cross, 6));
+    assert!(more.shapes.len() > 1 && more.volume < 0.85 * one.volume);
+    for (mesh, found) in [
+        (&drum, &hulls::hulls(&drum, 1)),
+        (&cross, &one),
+        (&cross, &more),
+    ] {
+        for t in &mesh.triangles {
+            let middle = t.iter().map(|i| mesh.points[*i]).sum::<V>() / 3.0;
+            for p in t.iter().map(|i| mesh.points[*i]).chain([middle]) {
+                let nearest = found.shapes.iter().map(|s| s.signed_distance(&p));
+                assert!(nearest.fold(f64::INFINITY, f64::min) <= 1e-12);
+            }
+        }
+    }
+}
+
 #[test]
 fn meshes_are_read_and_refused() {
     let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf 2 3 4\nf 3 1 -1\n";
@@ -416,7 +545,11 @@ fn meshes_are_read_and_refused() {
         1
     );
     assert!(mesh::read("a.stl", b"").is_err());
-    assert!(mesh::read("a.ply", b"").unwrap_err().contains("STL or OBJ"));
+    assert!(
+        mesh::read("a.ply", b"")
+            .unwrap_err()
+            .contains("STL, OBJ or DAE")
+    );
     assert!(
         mesh::read("a.obj", b"v 0 0 0\nf 1 2 3\n")
             .unwrap_err()

@@ -303,7 +303,8 @@ fn meshes_that_cannot_be_read_are_told_and_the_robot_is_used_all_the_same() {
             Some("v 0 0 NaN\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
             "not finite",
         ),
-        ("part.dae", Some("<COLLADA/>"), ".dae"),
+        ("part.dae", Some("<COLLADA/>"), "visual_scene"),
+        ("part.ply", Some("ply"), ".ply"),
     ] {
         let urdf = arm(BASE, &mesh(name, ""), LOWER, "");
         let dir = folder(&[("arm.urdf", &urdf)]);
@@ -367,6 +368,14 @@ fn statements_that_make_no_sense_are_refused_with_their_line() {
         (
             "[[volume]]\nlink = \"upper\"\nkind = \"box\"\nsize = [1, 0, 1]\n".into(),
             &["line 5", "size"],
+        ),
+        (
+            "[[volume]]\nlink = \"upper\"\nkind = \"hull\"\npoints = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]\n".into(),
+            &["line 5", "points", "plane"],
+        ),
+        (
+            "[[volume]]\nlink = \"upper\"\nkind = \"box\"\nsize = [1, 1, 1]\npoints = [[0, 0, 0]]\n".into(),
+            &["`points`", "hull"],
         ),
         (
             "[collision]\nmargin = 5\n".into(),
@@ -678,6 +687,66 @@ fn the_template_states_volumes_that_enclose_the_same() {
     let links = &after.geometry.volumes().links;
     let cover = links.iter().find(|v| v.link == cover).unwrap();
     assert!(matches!(cover.shapes[..], [Shape::Sphere { .. }]));
+}
+
+/// A ring of 24 blocks about the z axis, each 30 mm thick, their inner faces 0.1 m from it.
+fn ring() -> String {
+    let mut text = String::new();
+    for k in 0..24 {
+        for turn in [k, k + 1] {
+            let (s, c) = (f64::from(turn) * std::f64::consts::TAU / 24.0).sin_cos();
+            for r in [0.101, 0.13] {
+                for z in [-0.05, 0.05] {
+                    text += &format!("v {} {} {z}\n", r * c, r * s);
+                }
+            }
+        }
+        let corner = |i: i32| 8 * k + i;
+        for face in [
+            [1, 2, 4, 3],
+            [5, 6, 8, 7],
+            [1, 2, 6, 5],
+            [3, 4, 8, 7],
+            [1, 3, 7, 5],
+            [2, 4, 8, 6],
+        ] {
+            let [a, b, c, d] = face.map(corner);
+            text += &format!("f {a} {b} {c} {d}\n");
+        }
+    }
+    text
+}
+
+/// A ring that turns about a post: whatever the posture, 40 mm are between them.
+#[test]
+fn tighter_volumes_are_tried_where_coarse_ones_are_always_near() {
+    let post = r#"<collision><origin xyz="0 0 0.5"/><geometry><cylinder radius="0.06" length="1"/></geometry></collision>"#;
+    let arm = r#"<collision><origin xyz="0 0.25 0"/><geometry><box size="0.05 0.05 0.05"/></geometry></collision>"#;
+    let urdf = format!(
+        r#"<robot name="carousel"><link name="post">{post}</link><link name="arm">{INERTIA}{arm}</link>
+<link name="ring">{INERTIA}<collision><geometry><mesh filename="ring.obj"/></geometry></collision></link>
+<joint name="j1" type="revolute"><parent link="post"/><child link="arm"/><origin xyz="0 0 0.7"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="3" effort="60"/></joint>
+<joint name="j2" type="revolute"><parent link="arm"/><child link="ring"/><origin xyz="0 0 -0.4"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="3" effort="60"/></joint>
+</robot>"#
+    );
+    let dir = folder(&[("arm.urdf", &urdf), ("ring.obj", &ring())]);
+    let plant = load(&dir, "arm.urdf");
+    let robot = plant.robot();
+    // the capsules and boxes of the first fit fill the ring
+    assert!(inside(robot, "ring", &V::new(0.075, 0.0, 0.0)) < 0.0);
+    let scene = plant.scene().unwrap().unwrap();
+    assert!(scene.always_near.is_empty(), "{:?}", scene.always_near);
+    assert!(looked_at(&scene, "post", "ring"));
+    let hull = |v: &&excite::collision::scene::Volume| matches!(v.shape, Shape::Hull(_));
+    assert!(scene.volumes.iter().filter(hull).count() > 1);
+    // what is written says the same
+    let lent = plant.lend_volumes(robot);
+    assert!(inside(&lent, "ring", &V::new(0.075, 0.0, 0.0)) > 0.0);
+    let written = lent.to_toml_template("arm.urdf");
+    assert!(written.contains("kind = \"hull\""), "{written}");
+    let again = Robot::from_toml_str(&written, &urdf, "robot.toml").unwrap();
+    let scene = scene_of(&again);
+    assert!(scene.always_near.is_empty() && looked_at(&scene, "post", "ring"));
 }
 
 /// A slider of 4 m with a post in the middle: it passes on neither side, but stands free on both.

@@ -10,6 +10,7 @@ use crate::report::html::{self, Section};
 use crate::report::plot::{Colour, Shape as Drawn};
 use crate::report::view::{Body, Frame, Line, Nearest, Obstacle, Point, Solid, Use, View, Volume};
 use crate::robot::Joint;
+use crate::solid::hull::hull;
 use crate::solid::{Pose, Shape};
 use maud::html;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -205,6 +206,18 @@ fn solid(shape: &Shape) -> Solid {
             turn: quaternion(&pose.rotation),
             half: (*half).into(),
         },
+        Shape::Hull(h) => {
+            let centre = h.centre();
+            // the ball that sweeps the core is drawn as a growth of it
+            let out = |p: &Vector3<f64>| match (p - centre).try_normalize(0.0) {
+                Some(u) => p + u * h.radius,
+                None => *p,
+            };
+            Solid::Hull {
+                points: h.points.iter().map(|p| out(p).into()).collect(),
+                faces: hull(&h.points).map_or(Vec::new(), |h| h.faces),
+            }
+        }
     }
 }
 

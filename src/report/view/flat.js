@@ -48,8 +48,17 @@ class Flat {
       return x.points.slice(1).flatMap((p, i) => this.capsule({ ...x, a: x.points[i], b: p, plain: true }, piece));
     }
     if (x.kind === 'plate') return polygon(x.points, 0.95);
-    // the three sides of a box that are seen
     const out = [];
+    const shade = (n) => 0.7 + 0.3 * Math.max(0, 0.3 * n[0] + 0.95 * n[2]);
+    if (x.hull) {
+      for (const side of x.hull.sides) {
+        const corners = side.corners.map((c) => add(x.a, turn(x.m, c.map((y, k) => y * x.h[k]))));
+        const n = turn(x.m, side.normal);
+        if (dot(n, sub(camera.eye(), corners[0])) > 0) out.push(...polygon(corners, shade(n)));
+      }
+      return out;
+    }
+    // the three sides of a box that are seen
     for (let k = 0; k < 3; k++) for (const side of [-1, 1]) {
       const axis = (i) => x.m.slice(3 * (i % 3), 3 * (i % 3) + 3);
       const n = mul(axis(k), side);
@@ -57,7 +66,7 @@ class Flat {
       if (dot(n, sub(camera.eye(), centre)) <= 0) continue;
       const [u, v] = [mul(axis(k + 1), x.h[(k + 1) % 3]), mul(axis(k + 2), x.h[(k + 2) % 3])];
       const corners = [add(u, v), sub(u, v), mul(add(u, v), -1), sub(v, u)].map((c) => add(centre, c));
-      out.push(...polygon(corners, 0.7 + 0.3 * Math.max(0, 0.3 * n[0] + 0.95 * n[2])));
+      out.push(...polygon(corners, shade(n)));
     }
     return out;
   }

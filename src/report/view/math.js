@@ -80,6 +80,19 @@ function meets(x, eye, ray) {
   return near < far ? near : Infinity;
 }
 
+// A hull in the box about it: the box's centre and half edges, and the faces' corners as shares of these.
+function unitHull(points, faces) {
+  const range = (pick) => [0, 1, 2].map((k) => pick(...points.map((p) => p[k])));
+  const [low, high] = [range(Math.min), range(Math.max)];
+  const [centre, half] = [mix(low, high, 0.5), mul(sub(high, low), 0.5)];
+  const share = points.map((p) => p.map((x, k) => (x - centre[k]) / half[k]));
+  const sides = faces.map((f) => {
+    const [a, b, c] = f.map((i) => points[i]);
+    return { corners: f.map((i) => share[i]), normal: unit(cross(sub(b, a), sub(c, a))) };
+  });
+  return { centre, half, sides };
+}
+
 // A camera that turns about a point: angles in rad, the distance in metres.
 class Camera {
   constructor(centre, radius, points) {

@@ -153,6 +153,10 @@ class Model {
 
   // A volume or obstacle as an item of the picture.
   solid(v, pose) {
+    if (v.kind === 'hull') {
+      v.hull = v.hull || unitHull(v.points, v.faces);
+      return { kind: 'box', a: apply(pose, v.hull.centre), m: pose.m, h: v.hull.half, hull: v.hull };
+    }
     if (v.kind === 'box') return { kind: 'box', a: apply(pose, v.centre), m: turned(pose.m, rotation(v.turn)), h: v.half };
     if (v.kind === 'sphere') return { kind: 'capsule', a: apply(pose, v.from), b: apply(pose, v.from), r: v.radius };
     return { kind: 'capsule', a: apply(pose, v.from), b: apply(pose, v.to), r: v.radius };

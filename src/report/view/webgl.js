@@ -137,6 +137,12 @@ function boxMesh() {
   return [data, index];
 }
 
+// The faces of a hull, as shares of the box about it.
+function hullMesh({ sides }) {
+  const data = sides.flatMap(({ corners, normal }) => corners.flatMap((p) => [...p, ...normal, 0]));
+  return [data, sides.flatMap((_, i) => [3 * i, 3 * i + 1, 3 * i + 2])];
+}
+
 // A tube of five sides along points.
 function tubeMesh(points, radius) {
   const [data, index] = [[], []];
@@ -171,7 +177,7 @@ class WebGL {
     this.box = this.mesh(boxMesh());
     const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].flatMap(([x, y]) => [x, y, 0, 0, 0, 1, 0]);
     this.quad = this.mesh([corners, [0, 1, 2, 0, 2, 3]]);
-    this.tubes = new Map();
+    this.tubes = new Map(); // and hulls
     this.plate = this.mesh([[], []], gl.DYNAMIC_DRAW);
   }
 
@@ -217,7 +223,9 @@ class WebGL {
       gl.uniform3fv(at.a, x.a);
       gl.uniform3fv(at.h, x.h);
       gl.uniformMatrix3fv(at.m, false, x.m);
-      return this.box;
+      if (!x.hull) return this.box;
+      if (!this.tubes.has(x.hull)) this.tubes.set(x.hull, this.mesh(hullMesh(x.hull)));
+      return this.tubes.get(x.hull);
     }
     gl.uniform1f(at.kind, 2);
     if (x.kind === 'tube') {

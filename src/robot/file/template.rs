@@ -364,5 +364,14 @@ fn shape_keys(shape: &Shape, step: Option<f64>, out: &mut String) {
             };
             writeln!(out, "kind = \"box\"\nsize = {size}\npose = [{at}, {turn}]")
         }
+        Shape::Hull(h) => {
+            let points: Vec<String> = h.points.iter().map(three).collect();
+            writeln!(
+                out,
+                "kind = \"hull\"\npoints = [{}]\nradius = {:?}",
+                points.join(", "),
+                length(h.radius)
+            )
+        }
     };
 }

@@ -34,6 +34,7 @@ pub(crate) struct ShapeEntry {
     to: Option<Vec<f64>>,
     centre: Option<Vec<f64>>,
     radius: Option<f64>,
+    points: Option<Vec<Vec<f64>>>,
     size: Option<Vec<f64>>,
     pose: Option<Vec<f64>>,
     normal: Option<Vec<f64>>,
@@ -207,7 +208,8 @@ fn own_keys(source: Text, what: &str, e: &ShapeEntry) -> Result<()> {
         ("from", e.from.is_some(), "capsule"),
         ("to", e.to.is_some(), "capsule"),
         ("centre", e.centre.is_some(), "sphere"),
-        ("radius", e.radius.is_some(), "capsule sphere"),
+        ("radius", e.radius.is_some(), "capsule sphere hull"),
+        ("points", e.points.is_some(), "hull"),
         ("size", e.size.is_some(), "box"),
         ("pose", e.pose.is_some(), "box"),
         ("normal", e.normal.is_some(), "plane"),
@@ -273,10 +275,24 @@ fn shape(source: Text, what: &str, e: &ShapeEntry) -> Result<Shape> {
                 found,
             )
         }
+        "hull" => {
+            let points = e.points.iter().flatten();
+            let points: Option<Vec<_>> = points.map(|p| three(Some(p.as_slice()))).collect();
+            let radius = match e.radius {
+                None => Some(0.0),
+                Some(r) => (r == 0.0).then_some(r).or(positive(r)),
+            };
+            let found = points.zip(radius);
+            (
+                "a hull has points = [[x, y, z], …], at most 32 and not all in a plane, and perhaps a radius, in m",
+                found.and_then(|(points, radius)| Shape::hull(&points, radius)),
+            )
+        }
         other => {
-            let kinds = ["capsule", "sphere", "box"];
+            let kinds = ["capsule", "sphere", "box", "hull"];
             let hint = did_you_mean(other, kinds);
-            let message = format!("kind `{other}` is not known{hint}; use capsule, sphere or box");
+            let message =
+                format!("kind `{other}` is not known{hint}; use capsule, sphere, box or hull");
             return Err(source.error(at, what, message));
         }
     };

@@ -146,6 +146,19 @@ impl Geometry {
         self.fitted.get_or_init(|| volumes::fitted(self))
     }
 
+    /// The same statements, each part of these links enclosed by up to `most` hulls.
+    pub(crate) fn finer(&self, links: &[usize], most: usize) -> Self {
+        self.with_volumes(volumes::finer(self, links, most))
+    }
+
+    /// The same statements with these volumes.
+    pub(crate) fn with_volumes(&self, volumes: Volumes) -> Self {
+        Geometry {
+            fitted: Arc::new(OnceLock::from(volumes)),
+            ..self.clone()
+        }
+    }
+
     /// The links of a tree that comes from no URDF: the base and its bodies, without geometry.
     pub(crate) fn of_bodies(bodies: &[Body]) -> Self {
         let base = Link {

@@ -3,6 +3,7 @@
 use super::{Form, Geometry, find};
 use crate::error::{Warning, WarningKind};
 use crate::solid::fit::{self, Fit};
+use crate::solid::hulls::hulls;
 use crate::solid::mesh::{self, Mesh};
 use crate::solid::{Pose, Shape};
 use nalgebra::Vector3;
@@ -67,11 +68,36 @@ struct Enclosed {
 
 /// Volumes of all links: those that are stated, else those of the geometry.
 pub(super) fn fitted(geometry: &Geometry) -> Volumes {
+    enclosed(geometry, |mesh| fit::fit(mesh, MOST, ENOUGH))
+}
+
+/// The volumes of a geometry with those of some links fitted anew, by up to `most` hulls about each part.
+pub(super) fn finer(geometry: &Geometry, links: &[usize], most: usize) -> Volumes {
+    let some = Geometry {
+        parts: (geometry.parts.iter())
+            .filter(|p| links.contains(&p.link))
+            .cloned()
+            .collect(),
+        ..geometry.clone()
+    };
+    let mut fine = enclosed(&some, |mesh| hulls(mesh, most)).links;
+    fine.retain(|v| links.contains(&v.link));
+    let mut all = geometry.volumes().clone();
+    for volume in &mut all.links {
+        if let Some(k) = fine.iter().position(|v| v.link == volume.link) {
+            *volume = fine.swap_remove(k);
+        }
+    }
+    all
+}
+
+/// Volumes of all links, meshes fitted so.
+fn enclosed(geometry: &Geometry, fit: impl Fn(&Mesh) -> Fit + Sync) -> Volumes {
     let stated = |link: usize| geometry.stated.iter().any(|(l, _)| *l == link);
     let parts: Vec<_> = geometry.parts.iter().filter(|p| !stated(p.link)).collect();
     let enclosed: Vec<Result<Enclosed, String>> = parts
         .par_iter()
-        .map(|p| enclose(&p.form, &geometry.folders))
+        .map(|p| enclose(&p.form, &geometry.folders, &fit))
         .collect();
     let mut out = Volumes::default();
     for (index, link) in geometry.links.iter().enumerate() {
@@ -128,7 +154,12 @@ pub(super) fn fitted(geometry: &Geometry) -> Volumes {
 }
 
 /// Shapes about a form, in the frame of the link.
-fn enclose(form: &Form, folders: &[PathBuf]) -> Result<Enclosed, String> {
+fn enclose(
+    form: &Form,
+    folders: &[PathBuf],
+    fit: impl Fn(&Mesh) -> Fit,
+) -> Result<Enclosed, String> {
+    let about = |mesh: &Mesh, pose: &Pose, remark| about(fit(mesh), pose, remark);
     let solid = |shapes| Enclosed {
         shapes,
         fit: None,
@@ -145,8 +176,8 @@ fn enclose(form: &Form, folders: &[PathBuf]) -> Result<Enclosed, String> {
         Form::Mesh { pose, file, scale } => {
             let path = find::mesh(file, folders).ok_or_else(|| {
                 format!(
-                    "the mesh {file} was not found; name its folder in robot.toml: \
-                     `[collision]`, `meshes = [\"…\"]`, or in ROS_PACKAGE_PATH"
+                    "the mesh {file} was not found; name its folder by --meshes, in robot.toml \
+                     (`[collision]`, `meshes = [\"…\"]`), or in ROS_PACKAGE_PATH"
                 )
             })?;
             let size = std::fs::metadata(&path).map_or(0, |m| m.len());
@@ -192,8 +223,7 @@ fn in_metres(mesh: &mut Mesh, file: &str) -> Result<Option<String>, String> {
     )))
 }
 
-fn about(mesh: &Mesh, pose: &Pose, remark: Option<String>) -> Enclosed {
-    let fit = fit::fit(mesh, MOST, ENOUGH);
+fn about(fit: Fit, pose: &Pose, remark: Option<String>) -> Enclosed {
     Enclosed {
         shapes: fit.shapes.iter().map(|s| s.moved(pose)).collect(),
         fit: Some(fit),
