@@ -30,8 +30,8 @@ const SLIM: f64 = 5e-3;
 const NEARLY_ALL: f64 = 0.9;
 /// They keep this part of their median distance.
 const PART: f64 = 0.5;
-/// Most hulls about a part of a link that is near another one in every posture, or of any link where no posture is
-/// free: the first number, then the second, then the third.
+/// Most hulls about a part of a link that is near another one in every posture: the first number, then the second, then
+/// the third. Where no posture is free, all links are enclosed anew by the first.
 const FINER: [usize; 3] = [1, 6, 16];
 /// Free postures that are kept.
 const KEPT: usize = 400;
@@ -54,6 +54,8 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
                 let named = scene.always_near.iter().flatten();
                 named.filter_map(|n| robot.geometry.link(n)).collect()
             }
+            // what is in the way is told soon
+            Err(_) if most > FINER[0] => break,
             Err(_) => (0..robot.geometry.links.len()).collect(),
         };
         let fitted = &robot.geometry.volumes().links;

@@ -37,14 +37,21 @@ pub struct Separation {
 
 /// Separation of shape `a` on a body at `at_a` and shape `b` on a body at `at_b`, in the frame of both poses.
 pub fn separation(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> Separation {
+    // the buffers of a hull cost more than the distance of two capsules
+    if let (Some(va), Some(vb)) = (a.segment(at_a), b.segment(at_b)) {
+        let nearest = segments(va[0], va[1], vb[0], vb[1]);
+        return swept((a, at_a, &va), (b, at_b, &vb), nearest);
+    }
     let (mut va, mut vb) = ([V::zeros(); MOST_VERTICES], [V::zeros(); MOST_VERTICES]);
     let (ka, kb) = (a.core(at_a, &mut va), b.core(at_b, &mut vb));
     let (va, vb) = (&va[..ka], &vb[..kb]);
-    let (p, q) = match (ka, kb) {
-        (1 | 2, 1 | 2) => segments(va[0], va[ka - 1], vb[0], vb[kb - 1]),
-        _ => gjk(va, vb),
-    };
-    let (ra, rb) = (a.radius(), b.radius());
+    swept((a, at_a, va), (b, at_b, vb), gjk(va, vb))
+}
+
+/// Separation of two shapes whose cores are nearest at `p` and `q`.
+fn swept(first: Placed, second: Placed, (p, q): (V, V)) -> Separation {
+    let (ra, rb) = (first.0.radius(), second.0.radius());
+    let (va, vb) = (first.2, second.2);
     let gap = q - p;
     let core = gap.norm();
     let scale = 1e-9 * (1.0 + p.amax().max(q.amax()));
@@ -57,7 +64,7 @@ pub fn separation(a: &Shape, at_a: &Pose, b: &Shape, at_b: &Pose) -> Separation 
             normal: n,
         };
     }
-    let (depth, n) = overlap((a, at_a, va), (b, at_b, vb));
+    let (depth, n) = overlap(first, second);
     let p = match depth > 0.0 {
         true => contact(va, vb, &n),
         false => p,

@@ -148,6 +148,15 @@ impl Shape {
         }
     }
 
+    /// Ends of the core of a sphere or capsule in the frame `W` in which the body has pose `body`.
+    pub(super) fn segment(&self, body: &Pose) -> Option<[Vector3<f64>; 2]> {
+        match self {
+            Shape::Sphere { centre, .. } => Some([body.apply(centre); 2]),
+            Shape::Capsule { from, to, .. } => Some([body.apply(from), body.apply(to)]),
+            Shape::Box { .. } | Shape::Hull(_) => None,
+        }
+    }
+
     /// Vertices of the core in the frame `W` in which the body has pose `body`; returns how many.
     pub fn core(&self, body: &Pose, out: &mut Core) -> usize {
         match self {

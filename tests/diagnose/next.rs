@@ -128,21 +128,6 @@ fn told(before: &Diagnosis, after: &Diagnosis, n: &Proposal) -> [[f64; 2]; 2] {
 }
 
 #[test]
-fn stribeck_and_viscous_friction_of_an_h4_are_told_apart() {
-    let effect = Some((Field::Stribeck, "motor1=0.3,0.6"));
-    let mut case = Case::new("h4", effect, 0.5, 0.4, None);
-    let (before, n) = case.propose();
-    assert_eq!(
-        n.separates,
-        ["stribeck_friction", "nonlinear_viscous_friction"]
-    );
-    assert!(n.overlap[1] < 0.6 * n.overlap[0], "{:?}", n.overlap);
-    let after = case.rehearsed(&n);
-    let [[a, b], [later, rival]] = told(&before, &after, &n);
-    assert!(later > a && rival < 0.5 * b, "{a} {b} {later} {rival}");
-}
-
-#[test]
 fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
     let effect = Some((Field::Stribeck, "leg2=60,0.18"));
     let mut case = Case::new("hexapod", effect, 1.0, 0.4, None);
