@@ -75,7 +75,7 @@ pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
 
 /// The hull of a mesh, of its outermost points where there are very many.
 fn whole(mesh: &Mesh) -> Option<Hull> {
-    match mesh.points.len() > 20 * MANY {
+    match mesh.points.len() > MANY {
         true => hull_of(mesh, &extremes(&mesh.points)),
         false => hull(&mesh.points),
     }

@@ -1,7 +1,7 @@
 //! Convex hull of points in space (Barber, Dobkin & Huhdanpaa, ACM TOMS 22(4), 1996).
 //!
 //! Meshes hold many corners that lie in a plane up to rounding, which can lead the construction astray. So a hull is
-//! verified: it is closed, and no point lies above one of its faces. Where it fails, the points are moved by a little at
+//! verified: it is closed and bends outwards at every edge, and of few points none lies above a face. Where it fails, the points are moved by a little at
 //! random and the hull of those is taken, as Qhull does under the name "joggle".
 
 use nalgebra::Vector3;
@@ -70,20 +70,33 @@ pub fn hull(points: &[V]) -> Option<Hull> {
     })
 }
 
+/// Points times faces up to which every point is held against every face.
+const FEW: usize = 200_000;
+
 impl Hull {
-    /// Whether every edge has two faces, one in each direction, and no point lies higher above a face than this.
+    /// Whether every edge has two faces, one in each direction, neither of which bends inwards by more than this, and, of
+    /// few points, none lies higher above a face.
     fn sound(&self, points: &[V], most: f64) -> bool {
-        let mut edges = std::collections::BTreeSet::new();
-        let once = self.faces.iter().all(|[a, b, c]| {
-            [(a, b), (b, c), (c, a)]
-                .into_iter()
-                .all(|e| edges.insert(e))
-        });
-        let closed = || edges.iter().all(|(a, b)| edges.contains(&(*b, *a)));
-        let planes = || self.faces.iter().map(|f| Face::new(points, *f));
-        once && closed()
-            && planes().all(|f| points.iter().all(|p| f.height(p) <= most))
-            && self.volume > 0.0
+        // the corner that faces an edge, by its direction
+        let mut across = std::collections::BTreeMap::new();
+        for [a, b, c] in &self.faces {
+            for (from, to, corner) in [(a, b, c), (b, c, a), (c, a, b)] {
+                if across.insert((*from, *to), *corner).is_some() {
+                    return false;
+                }
+            }
+        }
+        let planes = self.faces.iter().map(|f| Face::new(points, *f));
+        let beside = |f: &Face| {
+            let [a, b, c] = f.corners;
+            [(b, a), (c, b), (a, c)].into_iter().all(|edge| {
+                let other = across.get(&edge);
+                other.is_some_and(|corner| f.height(&points[*corner]) <= most)
+            })
+        };
+        let few = self.faces.len() * points.len() <= FEW;
+        let below = |f: &Face| !few || points.iter().all(|p| f.height(p) <= most);
+        self.volume > 0.0 && planes.into_iter().all(|f| beside(&f) && below(&f))
     }
 }
 
