@@ -93,10 +93,11 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     doubts::unmoved(input, &opened.joints, &mut warnings);
     let chosen = select::choose(input, &|f| bench.model(f), &|part| bench.columns(part))?;
     let mut model = bench.model(chosen.features);
-    let x = robust::extend(&nominal, &model, &x_before);
+    let mut x = robust::extend(&nominal, &model, &x_before);
     plan.free = robust::seen(&model, &plan);
     let identifiability = identifiable::assess(&model.exact(), &plan, &x)?;
     doubts::determined(&model, &identifiability, &mut warnings);
+    robust::hold_tilt(&model, &mut plan, &mut x);
     let fit = robust::robustly(&mut model, &mut plan, &x)?;
     doubts::unsettled(&fit, &mut warnings);
     let x = robust::set_up_rest(&model, &plan, &fit.x)?;
