@@ -75,6 +75,11 @@ impl<'a> Bench<'a> {
         )
     }
 
+    /// Torques that gravity puts on the joints, by row; `None` where no inertia is known.
+    pub fn torques(&self) -> Option<&[Vec<f64>]> {
+        self.torques.as_deref()
+    }
+
     /// The plan of a first fit: rows for the fit count, no unknown of the robot is free.
     pub fn plan(&self, nominal: &Model) -> Plan {
         Plan {

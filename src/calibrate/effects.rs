@@ -10,13 +10,13 @@ use crate::robot::{Inertia, Motion, Robot};
 use nalgebra::{Matrix3, Vector3};
 
 /// Change of the joint's position under gravity that is expected of the joint that bears most, rad.
-const SAG: f64 = 3e-3;
+pub(super) const SAG: f64 = 3e-3;
 /// First harmonic of an encoder or gear, rad: a disc of 50 mm radius mounted 5 µm off its middle.
-const RUN_OUT: f64 = 1e-4;
+pub(super) const RUN_OUT: f64 = 1e-4;
 /// Half the play of a gear, rad.
-const PLAY: f64 = 1e-3;
+pub(super) const PLAY: f64 = 1e-3;
 /// Torque, as a fraction of the largest of that joint, below which gravity does not close the play.
-const SOFT: f64 = 0.05;
+pub(super) const SOFT: f64 = 0.05;
 
 /// Torques of gravity at the joints of a chain, from a robot with inertia.
 #[derive(Debug)]
@@ -133,6 +133,7 @@ pub fn rates(features: &[Feature], q: &[f64], torque: Option<&[f64]>) -> Vec<f64
             Shape::Sine => q.sin(),
             Shape::Cosine => q.cos(),
             Shape::Sign => (t / f.soft).tanh(),
+            Shape::Given => 0.0,
         }
     };
     features.iter().map(of).collect()

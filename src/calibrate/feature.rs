@@ -11,6 +11,8 @@ pub enum Shape {
     Sine,
     /// `cos q`
     Cosine,
+    /// its values are given with it, row by row
+    Given,
     /// sign of the torque that gravity puts on the joint; soft within [`Feature::soft`]
     Sign,
 }

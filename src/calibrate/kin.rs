@@ -78,8 +78,8 @@ impl Kin {
         match self {
             Kin::Arm(arm) => Ok(arm.pose(q, x, features, rate)),
             Kin::Parallel(p) => match near {
-                Some(near) => p.pose(q, x, near),
-                None => p.pose(q, x, &p.nominal(q)?),
+                Some(near) => p.pose(q, x, features, rate, near),
+                None => p.pose(q, x, features, rate, &p.nominal(q)?),
             },
         }
     }

@@ -18,6 +18,8 @@ mod feature;
 mod file;
 mod fit;
 mod frame;
+#[doc(hidden)]
+pub mod gap;
 mod gravity;
 mod identifiable;
 #[doc(hidden)]
@@ -49,7 +51,7 @@ mod unknown;
 pub mod write;
 mod write_parallel;
 
-pub use file::{Calibration, Distance, EFFECTS, Measurement, Tolerances};
+pub use file::{Calibration, Distance, EFFECTS, Measurement, Tolerances, is_calibration};
 pub use frame::Frame;
 pub use identifiable::{Confounded, Identifiability};
 pub use judge::{Errors, Stats};

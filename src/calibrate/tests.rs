@@ -81,6 +81,7 @@ fn row(measurement: usize, q: Vec<f64>, value: Value, fit: bool) -> Row {
         q,
         value,
         covariance: None,
+        approach: Vec::new(),
         fit,
     }
 }

@@ -12,6 +12,8 @@ pub enum Part {
     Eccentricity,
     /// dead play that gravity closes to one side
     Backlash,
+    /// zero of a joint, where it is looked at alone
+    Offset,
     /// pose of the base in the camera's (or tracker's) frame
     Camera,
     /// pose of the target on the tool or platform
@@ -64,7 +66,7 @@ impl Unknown {
     pub fn of_robot(&self) -> bool {
         matches!(
             self.part,
-            Part::Geometry | Part::Compliance | Part::Eccentricity | Part::Backlash
+            Part::Geometry | Part::Compliance | Part::Eccentricity | Part::Backlash | Part::Offset
         )
     }
 }

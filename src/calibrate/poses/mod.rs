@@ -12,7 +12,7 @@
 //! exchange, then by small steps of single postures. Last they are put in an order with a short way. For sockets the
 //! rigid motions of all predictions together are taken out of `L`: no contact tells where the base stands.
 
-mod candidates;
+pub(super) mod candidates;
 mod criterion;
 mod order;
 pub mod page;
@@ -194,7 +194,7 @@ fn refine(
 }
 
 /// A calibration whose rows are the candidates.
-fn calibration(opened: &Opened, request: &Request, found: &[Candidate]) -> Calibration {
+pub(super) fn calibration(opened: &Opened, request: &Request, found: &[Candidate]) -> Calibration {
     let files = request.points.len().max(1);
     let measurements = (0..files)
         .map(|k| Measurement {
@@ -218,6 +218,7 @@ fn calibration(opened: &Opened, request: &Request, found: &[Candidate]) -> Calib
             _ => Value::Contact,
         },
         covariance: None,
+        approach: Vec::new(),
         fit: true,
     };
     Calibration {
