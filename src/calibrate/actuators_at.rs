@@ -48,7 +48,7 @@ impl Model<'_> {
         j.view_mut((0, 0), (actuators, errors))
             .copy_from(&a.by_errors);
         for (k, f) in self.features.iter().enumerate() {
-            j[(f.joint, errors + k)] = a.by_reading[f.joint] * self.rates[row][k];
+            j[(f.joint, errors + k)] = a.by_reading[f.joint] * self.rates[row][k].turn;
         }
         if held > 0 {
             let (value, by) = p.orientation(&base.r);

@@ -2,7 +2,7 @@
 //! its turn, dead play that gravity closes. Each is linear in one number, so that `q + Σ η_k z_k(q)` takes the
 //! place of the reading `q`.
 
-use super::feature::{Feature, Shape};
+use super::feature::{Feature, Rate, Shape};
 use super::serial::Link;
 use super::unknown::{Part, Unknown};
 use crate::dynamics::{Samples, Tree, Workspace};
@@ -21,10 +21,10 @@ pub(super) const SOFT: f64 = 0.05;
 /// Torques of gravity at the joints of a chain, from a robot with inertia.
 #[derive(Debug)]
 pub struct Gravity {
-    robot: Robot,
+    pub(super) robot: Robot,
     tree: Tree,
     /// index of each measured joint among the robot's
-    joints: Vec<usize>,
+    pub(super) joints: Vec<usize>,
     /// what the figures come from
     pub source: String,
 }
@@ -125,16 +125,16 @@ pub fn features(
 }
 
 /// Values of the columns in one posture.
-pub fn rates(features: &[Feature], q: &[f64], torque: Option<&[f64]>) -> Vec<f64> {
+pub fn rates(features: &[Feature], q: &[f64], torque: Option<&[f64]>) -> Vec<Rate> {
     let of = |f: &Feature| {
         let (q, t) = (q[f.joint], torque.map_or(0.0, |t| t[f.joint]));
-        match f.shape {
+        Rate::turn(match f.shape {
             Shape::Torque => t,
             Shape::Sine => q.sin(),
             Shape::Cosine => q.cos(),
             Shape::Sign => (t / f.soft).tanh(),
-            Shape::Given => 0.0,
-        }
+            Shape::Given | Shape::Bend => 0.0,
+        })
     };
     features.iter().map(of).collect()
 }

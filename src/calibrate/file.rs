@@ -133,7 +133,12 @@ struct DistanceEntry {
 const DISTANCE_STD: f64 = 1e-4;
 
 /// The effects that can be asked for, by their names.
-pub const EFFECTS: [&str; 3] = ["joint_compliance", "encoder_eccentricity", "backlash"];
+pub const EFFECTS: [&str; 4] = [
+    "joint_compliance",
+    "encoder_eccentricity",
+    "backlash",
+    "link_compliance",
+];
 
 /// Whether a file is a calibration and no experiment, by its content.
 pub fn is_calibration(path: &Path) -> bool {

@@ -1,6 +1,6 @@
 //! The robot's kinematics with its errors.
 
-use super::feature::Feature;
+use super::feature::{Feature, Rate};
 use super::frame::Frame;
 use super::parallel::Parallel;
 use super::serial::{Arm, Posed};
@@ -72,7 +72,7 @@ impl Kin {
         q: &[f64],
         x: &[f64],
         features: &[Feature],
-        rate: &[f64],
+        rate: &[Rate],
         near: Option<&Frame>,
     ) -> Result<Posed> {
         match self {

@@ -11,6 +11,7 @@
 
 mod actuators_at;
 mod bench;
+mod bend;
 mod cells;
 mod doubts;
 mod effects;
@@ -101,6 +102,7 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     doubts::determined(&model, &identifiability, &mut warnings);
     robust::hold_tilt(&model, &mut plan, &mut x);
     let fit = robust::robustly(&mut model, &mut plan, &x)?;
+    let fit = robust::stiff(&model, &mut plan, fit)?;
     doubts::unsettled(&fit, &mut warnings);
     let x = robust::set_up_rest(&model, &plan, &fit.x)?;
     let after = judge::errors(&model, &x);

@@ -12,7 +12,7 @@
 //! take. Each row is whitened by the covariance that the noise of pose and encoder has in its residuals. The pose of
 //! given readings, needed to predict, is found by Newton on the same equations.
 
-use super::feature::Feature;
+use super::feature::{Feature, Rate};
 use super::frame::{Frame, exp, log};
 use super::serial::Posed;
 use super::unknown::{Part, Unknown};
@@ -235,10 +235,10 @@ impl Parallel {
     }
 
     /// Readings with what the joints do beside turning: features behind the dimensions in `x`.
-    pub fn readings(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[f64]) -> Vec<f64> {
+    pub fn readings(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[Rate]) -> Vec<f64> {
         let mut q = q.to_vec();
         for (k, f) in features.iter().enumerate() {
-            q[f.joint] += x[self.errors() + k] * rate[k];
+            q[f.joint] += x[self.errors() + k] * rate[k].turn;
         }
         q
     }
@@ -252,7 +252,7 @@ impl Parallel {
         q: &[f64],
         x: &[f64],
         features: &[Feature],
-        rate: &[f64],
+        rate: &[Rate],
         near: &Frame,
     ) -> Result<Posed> {
         let readings = self.readings(q, x, features, rate);
@@ -305,7 +305,7 @@ impl Parallel {
         let mut by = DMatrix::zeros(a.value.len(), errors + features.len());
         by.columns_mut(0, errors).copy_from(&a.by_errors);
         for (k, f) in features.iter().enumerate() {
-            by[(f.joint, errors + k)] = a.by_reading[f.joint] * rate[k];
+            by[(f.joint, errors + k)] = a.by_reading[f.joint] * rate[k].turn;
         }
         let rates = solve(&a, &(-by))?;
         let mut jacobian = DMatrix::zeros(6, errors + features.len());

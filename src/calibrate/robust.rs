@@ -5,6 +5,7 @@ use super::judge;
 use super::kin::Kin;
 use super::kind::Kind;
 use super::model::{Algorithm, Model};
+use super::unknown::Part;
 use crate::error::Result;
 
 /// Rounds of fitting and leaving out.
@@ -150,4 +151,26 @@ pub(super) fn hold_tilt(model: &Model, plan: &mut Plan, x: &mut [f64]) {
         plan.free[k] = false;
         x[k] = 0.0;
     }
+}
+
+/// Links cannot bend against their load: a flexibility that came out negative is held at zero, and the fit repeated.
+pub(super) fn stiff(model: &Model, plan: &mut Plan, mut fit: Fit) -> Result<Fit> {
+    let bending = |k: &usize| model.unknowns[*k].part == Part::Bending;
+    let all: Vec<usize> = (0..model.of_robot).filter(bending).collect();
+    for _ in 0..all.len() {
+        let mut x = fit.x.clone();
+        let mut changed = false;
+        for &k in &all {
+            if x[k] < 0.0 {
+                x[k] = 0.0;
+                plan.free[k] = false;
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+        fit = fit::solve(model, plan, &x)?;
+    }
+    Ok(fit)
 }

@@ -578,6 +578,7 @@ fn chosen_postures_know_more_than_random_ones() {
             kind: Kind::Pose,
             points: Vec::new(),
             region: None,
+            sight: None,
             std: [3e-4, 3.5e-4],
             tolerances: Tolerances::default(),
             candidates: 300,

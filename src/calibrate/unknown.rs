@@ -8,6 +8,8 @@ pub enum Part {
     Geometry,
     /// how joints give way under gravity
     Compliance,
+    /// how links bend under gravity
+    Bending,
     /// error of a joint that repeats with its turn
     Eccentricity,
     /// dead play that gravity closes to one side
@@ -66,7 +68,12 @@ impl Unknown {
     pub fn of_robot(&self) -> bool {
         matches!(
             self.part,
-            Part::Geometry | Part::Compliance | Part::Eccentricity | Part::Backlash | Part::Offset
+            Part::Geometry
+                | Part::Compliance
+                | Part::Bending
+                | Part::Eccentricity
+                | Part::Backlash
+                | Part::Offset
         )
     }
 }

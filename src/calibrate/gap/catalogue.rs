@@ -2,7 +2,7 @@
 
 use super::conditions::Conditions;
 use crate::calibrate::effects::{PLAY, RUN_OUT, SAG, SOFT};
-use crate::calibrate::feature::{Feature, Shape};
+use crate::calibrate::feature::{Feature, Rate, Shape};
 use crate::calibrate::file::Calibration;
 use crate::calibrate::kin::Kin;
 use crate::calibrate::open::Opened;
@@ -22,7 +22,7 @@ pub struct Effect {
 }
 
 /// The effects.
-pub const EFFECTS: [Effect; 10] = [
+pub const EFFECTS: [Effect; 9] = [
     Effect {
         name: "joint_offset",
         equation: "q + η",
@@ -68,11 +68,6 @@ pub const EFFECTS: [Effect; 10] = [
         equation: "l + η sign(f_g)",
         separated_by: "poses in which the force along the leg changes its sign",
     },
-    Effect {
-        name: "link_compliance",
-        equation: "E(η_1 f_g, η_2 m_g), f_g and m_g the force and moment of gravity at the end of the link",
-        separated_by: "the same postures with another load",
-    },
 ];
 
 /// What is said of an effect.
@@ -104,7 +99,7 @@ pub struct Catalogue {
     /// columns beside the dimensions
     pub features: Vec<Feature>,
     /// their values, by row
-    pub rates: Vec<Vec<f64>>,
+    pub rates: Vec<Vec<Rate>>,
     /// groups whose base may have moved
     pub bases: Vec<usize>,
 }
@@ -332,7 +327,7 @@ impl Catalogue {
                 unknown,
             });
             for (row, v) in self.rates.iter_mut().zip(c.values) {
-                row.push(v);
+                row.push(Rate::turn(v));
             }
         }
     }

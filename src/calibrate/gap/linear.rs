@@ -218,6 +218,25 @@ impl<'a> Bed<'a> {
             .sum()
     }
 
+    /// Fitted rows that do not count, with a mean square up to a limit.
+    pub fn strays(&self, x: &[f64], limit: f64) -> Vec<usize> {
+        let rows = &self.model.input.rows;
+        let own = (0..rows.len()).filter(|&i| rows[i].fit && !(self.weights[i] > 0.0));
+        own.filter(|&i| {
+            let (cost, count) = self.misfit(&[i], x);
+            count > 0.0 && cost <= limit * count
+        })
+        .collect()
+    }
+
+    /// Misfit of some rows, and the number of their residuals.
+    pub fn misfit(&self, rows: &[usize], x: &[f64]) -> (f64, f64) {
+        let blocks = rows.iter().filter_map(|&i| self.model.block(i, x));
+        blocks.fold((0.0, 0.0), |(cost, count), b| {
+            (cost + b.r.norm_squared(), count + b.r.len() as f64)
+        })
+    }
+
     /// Effects at places that these rows do not show.
     pub fn untestable(&self) -> Result<Vec<(&'static str, String)>> {
         let problem = self.problem()?;

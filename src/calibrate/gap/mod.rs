@@ -33,6 +33,11 @@ use catalogue::Catalogue;
 use conditions::Conditions;
 use linear::Bed;
 
+/// Largest share of fitted rows that are left out as strays.
+const STRAY: f64 = 0.25;
+/// Residuals for each unknown from which on they tell the noise.
+const MANY: usize = 3;
+
 /// What is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Ask {
@@ -162,16 +167,27 @@ fn everything(
     let fit = |mut full: Model, x: &[f64]| -> Result<(f64, Vec<f64>)> {
         let mut plan = plan.clone();
         plan.free = robust::seen(&full, &plan);
+        let wanted = plan.weights.clone();
         robust::robustly(&mut full, &mut plan, x)?;
-        Ok((full.noise, plan.weights))
+        let (kept, all): (f64, f64) = (plan.weights.iter().sum(), wanted.iter().sum());
+        // so many do not stray: they are what is not explained
+        let rows = if kept < (1.0 - STRAY) * all {
+            wanted
+        } else {
+            plan.weights
+        };
+        Ok((full.noise, rows))
     };
-    if catalogue.bases.is_empty() {
-        return fit(model.clone(), x);
-    }
     let mut apart = input.clone();
-    for m in &mut apart.measurements {
-        m.instrument = format!("{} of {}", m.instrument, m.group);
+    if !catalogue.bases.is_empty() {
+        for m in &mut apart.measurements {
+            m.instrument = format!("{} of {}", m.instrument, m.group);
+        }
     }
+    // with many rows what is left says more of the noise than what is stated
+    let rows = input.rows.iter().enumerate().filter(|(_, r)| r.fit);
+    let residuals: usize = rows.map(|(i, _)| model.residuals(i)).sum();
+    apart.noise_stated &= residuals < MANY * model.count();
     let Ok(bench) = Bench::new(&apart, opened, model.settings, &mut Vec::new()) else {
         return fit(model.clone(), x);
     };

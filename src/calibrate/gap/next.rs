@@ -265,6 +265,7 @@ fn pool(opened: &Opened, bed: &Bed, gravity: Option<&Gravity>, seed: u64) -> Res
             .map(|&m| bed.model.socket(m, &bed.x))
             .collect(),
         region: None,
+        sight: None,
         std: measured.std,
         tolerances: input.prior,
         candidates: CANDIDATES,

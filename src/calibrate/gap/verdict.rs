@@ -14,9 +14,11 @@ const NOT_HELD: f64 = 0.4;
 /// A rival explains the rows as well if the odds against it are below this, natural logarithm.
 const AS_WELL: f64 = 3.0;
 /// In a gap that is not explained, an effect must explain this part of its share on rows held out, too.
-const AGREES: f64 = 0.5;
+const AGREES: f64 = 0.67;
 /// Share of the gap that may be left in a gap that is explained.
 const LITTLE: f64 = 0.15;
+/// Mean square of a stray row, by that of the gap, up to which it may be a part of it.
+const STRAYS: f64 = 9.0;
 /// Mean square of residuals of noise that is stated 12 % too small.
 const KNOWN: f64 = 1.25;
 /// Standard deviations of the mean square from which on it is no accident.
@@ -116,7 +118,13 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
         true => bed.model.noise.powi(2),
         false => 1.0,
     };
-    let squares = [cost_empty * unit / free(0.0), cost * unit / free(decided)];
+    // strays that are no larger than the gap are a part of it
+    let more = bed.strays(&empty, STRAYS * cost_empty / free(0.0));
+    let square = |x: &[f64], cost: f64, taken: f64| {
+        let (extra, count) = bed.misfit(&more, x);
+        (cost + extra) * unit / (free(taken) + count)
+    };
+    let squares = [square(&empty, cost_empty, 0.0), square(&x, cost, decided)];
     // the noise that is stated is known to a tenth or so
     let limit = |taken: f64| KNOWN + SURE * (2.0 / free(taken)).sqrt();
     let is_gap = squares[0] > limit(0.0) || !set.is_empty();
