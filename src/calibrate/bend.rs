@@ -133,9 +133,9 @@ mod tests {
         let d = (end - poses[1].position) / length;
         assert!(d.dot(&robot.gravity).abs() < 1e-3, "the upper arm is level");
         let (mut weight, mut lever) = (0.0, 0.0);
-        for k in 2..6 {
-            let com = poses[k].apply(&robot.bodies[k].inertia.com().unwrap());
-            let w = 9.81 * robot.bodies[k].inertia.mass();
+        for (pose, body) in poses.iter().zip(&robot.bodies).skip(2) {
+            let com = pose.apply(&body.inertia.com().unwrap());
+            let w = 9.81 * body.inertia.mass();
             weight += w;
             lever += w * d.dot(&(com - end));
         }

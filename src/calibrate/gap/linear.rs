@@ -202,11 +202,10 @@ impl<'a> Bed<'a> {
                 model.unknowns[c].prior *= size;
             }
         }
-        for k in 0..model.of_robot {
-            if !plan.free[k] {
-                x[k] = 0.0;
-            }
-        }
+        let robot = x.iter_mut().zip(&plan.free).take(model.of_robot);
+        robot
+            .filter(|(_, free)| !**free)
+            .for_each(|(v, _)| *v = 0.0);
         let x = fit::solve(&model, &plan, &x)?.x;
         robust::set_up_rest(&model, &plan, &x)
     }

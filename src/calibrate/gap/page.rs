@@ -113,7 +113,7 @@ pub fn html(d: &PoseDiagnosis) -> String {
             html! {
                 p { "An effect of its expected size would be lost in the noise, or in where camera, target or sockets are." }
                 (html::details(
-                    &count(rows.len(), "effect and its place"),
+                    &count(rows.len(), "place"),
                     html::table(&["effect", "place", "what would show it"], &[0, 1, 2], &rows),
                 ))
             },

@@ -144,10 +144,9 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
             // a moved base is not taken back here: it is in the cameras
             if bed.places[set[k].0].effect != "base_pose"
                 && let (Some(with), Some(gap)) = (held, held_gap)
+                && let Some(without) = held_out(bed, &bed.fitted(&rest)?)
             {
-                if let Some(without) = held_out(bed, &bed.fitted(&rest)?) {
-                    f.holdout = Some(((without - with) / gap).clamp(-1.0, 1.0));
-                }
+                f.holdout = Some(((without - with) / gap).clamp(-1.0, 1.0));
             }
             // what is left is no noise: fitted rows alone prove nothing, and an effect that is smaller than it may be
             // a part of it
