@@ -25,6 +25,7 @@ fn main() -> excite::Result<()> {
         kind: Kind::Pose,
         points: Vec::new(),
         region: None,
+        sight: None,
         std: noise,
         tolerances: Tolerances::default(),
         candidates: 5000,

@@ -28,7 +28,8 @@ impl Model<'_> {
         let at_target = camera.inverse().then(&seen);
         let base = at_target.then(&target.inverse());
         let implicit = self.settings.algorithm == Algorithm::Implicit;
-        let a = p.actuators_at(&base, &data.q, &x[..n], implicit);
+        let readings = p.readings(&data.q, &x[..n], &self.features, &self.rates[row]);
+        let a = p.actuators_at(&base, &readings, &x[..n], implicit);
         let held = match self.settings.orientation {
             true => p.held().len(),
             false => 0,
@@ -43,7 +44,12 @@ impl Model<'_> {
         let mut j = DMatrix::zeros(lines, columns.len());
         r.rows_mut(0, actuators).copy_from(&a.value);
         by_pose.rows_mut(0, actuators).copy_from(&a.by_pose);
-        j.view_mut((0, 0), (actuators, n)).copy_from(&a.by_errors);
+        let errors = p.errors();
+        j.view_mut((0, 0), (actuators, errors))
+            .copy_from(&a.by_errors);
+        for (k, f) in self.features.iter().enumerate() {
+            j[(f.joint, errors + k)] = a.by_reading[f.joint] * self.rates[row][k].turn;
+        }
         if held > 0 {
             let (value, by) = p.orientation(&base.r);
             r.rows_mut(actuators, held).copy_from(&value);

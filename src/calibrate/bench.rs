@@ -1,8 +1,9 @@
 //! What a calibration knows before it begins: nominal poses, torques of gravity, where the set-up starts.
 
+use super::bend::{self, Bends};
 use super::doubts;
 use super::effects::{self, Gravity};
-use super::feature::Feature;
+use super::feature::{Feature, Shape};
 use super::file::Calibration;
 use super::fit::Plan;
 use super::frame::Frame;
@@ -24,6 +25,8 @@ pub struct Bench<'a> {
     pub gravity: Option<Gravity>,
     /// torques of gravity, by row and joint, N m
     torques: Option<Vec<Vec<f64>>>,
+    /// how links bend under it, where that is known
+    bends: Option<Bends>,
     /// poses with nominal geometry, by row; `None` where the readings cannot be
     poses: Vec<Option<Frame>>,
     start: Start,
@@ -56,6 +59,10 @@ impl<'a> Bench<'a> {
             opened,
             settings,
             torques: gravity.as_ref().map(|g| g.torques(&postures)),
+            bends: gravity.as_ref().and_then(|g| match &opened.kin {
+                Kin::Arm(arm) => Some(bend::bends(g, &arm.names(), &postures)),
+                Kin::Parallel(_) => None,
+            }),
             gravity,
             poses,
             start,
@@ -64,7 +71,7 @@ impl<'a> Bench<'a> {
 
     /// The model whose joints do this beside turning.
     pub fn model(&self, features: Vec<Feature>) -> Model<'_> {
-        Model::new(
+        let mut model = Model::new(
             self.input,
             &self.opened.kin,
             features,
@@ -72,7 +79,22 @@ impl<'a> Bench<'a> {
             self.start.clone(),
             &self.poses,
             self.settings,
-        )
+        );
+        if let Some(bends) = &self.bends {
+            for (rates, bends) in model.rates.iter_mut().zip(bends) {
+                for (rate, f) in rates.iter_mut().zip(&model.features) {
+                    if f.shape == Shape::Bend {
+                        rate.place = bends[f.joint];
+                    }
+                }
+            }
+        }
+        model
+    }
+
+    /// Torques that gravity puts on the joints, by row; `None` where no inertia is known.
+    pub fn torques(&self) -> Option<&[Vec<f64>]> {
+        self.torques.as_deref()
     }
 
     /// The plan of a first fit: rows for the fit count, no unknown of the robot is free.
@@ -90,6 +112,12 @@ impl<'a> Bench<'a> {
     pub fn columns(&self, part: Part) -> Vec<Feature> {
         let names = &self.opened.joints;
         let motions = self.opened.kin.motions(names.len());
+        if part == Part::Bending {
+            return match (&self.opened.kin, &self.bends) {
+                (Kin::Arm(arm), Some(bends)) => bend::features(&arm.names(), bends),
+                _ => Vec::new(),
+            };
+        }
         match (&self.opened.kin, &self.torques) {
             (Kin::Parallel(_), _) => Vec::new(),
             (Kin::Arm(_), Some(t)) => effects::features(part, names, &motions, t),

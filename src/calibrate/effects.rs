@@ -2,7 +2,7 @@
 //! its turn, dead play that gravity closes. Each is linear in one number, so that `q + Σ η_k z_k(q)` takes the
 //! place of the reading `q`.
 
-use super::feature::{Feature, Shape};
+use super::feature::{Feature, Rate, Shape};
 use super::serial::Link;
 use super::unknown::{Part, Unknown};
 use crate::dynamics::{Samples, Tree, Workspace};
@@ -10,21 +10,21 @@ use crate::robot::{Inertia, Motion, Robot};
 use nalgebra::{Matrix3, Vector3};
 
 /// Change of the joint's position under gravity that is expected of the joint that bears most, rad.
-const SAG: f64 = 3e-3;
+pub(super) const SAG: f64 = 3e-3;
 /// First harmonic of an encoder or gear, rad: a disc of 50 mm radius mounted 5 µm off its middle.
-const RUN_OUT: f64 = 1e-4;
+pub(super) const RUN_OUT: f64 = 1e-4;
 /// Half the play of a gear, rad.
-const PLAY: f64 = 1e-3;
+pub(super) const PLAY: f64 = 1e-3;
 /// Torque, as a fraction of the largest of that joint, below which gravity does not close the play.
-const SOFT: f64 = 0.05;
+pub(super) const SOFT: f64 = 0.05;
 
 /// Torques of gravity at the joints of a chain, from a robot with inertia.
 #[derive(Debug)]
 pub struct Gravity {
-    robot: Robot,
+    pub(super) robot: Robot,
     tree: Tree,
     /// index of each measured joint among the robot's
-    joints: Vec<usize>,
+    pub(super) joints: Vec<usize>,
     /// what the figures come from
     pub source: String,
 }
@@ -125,15 +125,16 @@ pub fn features(
 }
 
 /// Values of the columns in one posture.
-pub fn rates(features: &[Feature], q: &[f64], torque: Option<&[f64]>) -> Vec<f64> {
+pub fn rates(features: &[Feature], q: &[f64], torque: Option<&[f64]>) -> Vec<Rate> {
     let of = |f: &Feature| {
         let (q, t) = (q[f.joint], torque.map_or(0.0, |t| t[f.joint]));
-        match f.shape {
+        Rate::turn(match f.shape {
             Shape::Torque => t,
             Shape::Sine => q.sin(),
             Shape::Cosine => q.cos(),
             Shape::Sign => (t / f.soft).tanh(),
-        }
+            Shape::Given | Shape::Bend => 0.0,
+        })
     };
     features.iter().map(of).collect()
 }

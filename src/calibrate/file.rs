@@ -60,7 +60,7 @@ impl Default for Tolerances {
 }
 
 /// A calibration: what was measured on which robot.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Calibration {
     /// the `calibration.toml`
     pub path: PathBuf,
@@ -133,7 +133,22 @@ struct DistanceEntry {
 const DISTANCE_STD: f64 = 1e-4;
 
 /// The effects that can be asked for, by their names.
-pub const EFFECTS: [&str; 3] = ["joint_compliance", "encoder_eccentricity", "backlash"];
+pub const EFFECTS: [&str; 4] = [
+    "joint_compliance",
+    "encoder_eccentricity",
+    "backlash",
+    "link_compliance",
+];
+
+/// Whether a file is a calibration and no experiment, by its content.
+pub fn is_calibration(path: &Path) -> bool {
+    let table = std::fs::read_to_string(path)
+        .ok()
+        .and_then(|t| t.parse::<toml::Table>().ok());
+    table.is_some_and(|t| {
+        !t.contains_key("record") && (t.contains_key("measurement") || t.contains_key("poses"))
+    })
+}
 
 impl Calibration {
     /// Reads a `calibration.toml` and its files. `joints` gives the names of the joints whose readings stand in them,

@@ -1,6 +1,6 @@
 //! The robot's kinematics with its errors.
 
-use super::feature::Feature;
+use super::feature::{Feature, Rate};
 use super::frame::Frame;
 use super::parallel::Parallel;
 use super::serial::{Arm, Posed};
@@ -72,14 +72,14 @@ impl Kin {
         q: &[f64],
         x: &[f64],
         features: &[Feature],
-        rate: &[f64],
+        rate: &[Rate],
         near: Option<&Frame>,
     ) -> Result<Posed> {
         match self {
             Kin::Arm(arm) => Ok(arm.pose(q, x, features, rate)),
             Kin::Parallel(p) => match near {
-                Some(near) => p.pose(q, x, near),
-                None => p.pose(q, x, &p.nominal(q)?),
+                Some(near) => p.pose(q, x, features, rate, near),
+                None => p.pose(q, x, features, rate, &p.nominal(q)?),
             },
         }
     }

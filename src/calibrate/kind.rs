@@ -50,6 +50,11 @@ impl Kind {
         }
     }
 
+    /// Whether a row of it is one number, along a normal.
+    pub(super) fn is_line(self) -> bool {
+        matches!(self, Kind::Plane | Kind::Gauge)
+    }
+
     /// Whether poses of its instrument are unknown.
     pub fn has_instrument(self) -> bool {
         matches!(self, Kind::Pose | Kind::Position)

@@ -11,6 +11,7 @@
 
 mod actuators_at;
 mod bench;
+mod bend;
 mod cells;
 mod doubts;
 mod effects;
@@ -18,6 +19,8 @@ mod feature;
 mod file;
 mod fit;
 mod frame;
+#[doc(hidden)]
+pub mod gap;
 mod gravity;
 mod identifiable;
 #[doc(hidden)]
@@ -49,7 +52,7 @@ mod unknown;
 pub mod write;
 mod write_parallel;
 
-pub use file::{Calibration, Distance, EFFECTS, Measurement, Tolerances};
+pub use file::{Calibration, Distance, EFFECTS, Measurement, Tolerances, is_calibration};
 pub use frame::Frame;
 pub use identifiable::{Confounded, Identifiability};
 pub use judge::{Errors, Stats};
@@ -93,11 +96,13 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     doubts::unmoved(input, &opened.joints, &mut warnings);
     let chosen = select::choose(input, &|f| bench.model(f), &|part| bench.columns(part))?;
     let mut model = bench.model(chosen.features);
-    let x = robust::extend(&nominal, &model, &x_before);
+    let mut x = robust::extend(&nominal, &model, &x_before);
     plan.free = robust::seen(&model, &plan);
     let identifiability = identifiable::assess(&model.exact(), &plan, &x)?;
     doubts::determined(&model, &identifiability, &mut warnings);
+    robust::hold_tilt(&model, &mut plan, &mut x);
     let fit = robust::robustly(&mut model, &mut plan, &x)?;
+    let fit = robust::stiff(&model, &mut plan, fit)?;
     doubts::unsettled(&fit, &mut warnings);
     let x = robust::set_up_rest(&model, &plan, &fit.x)?;
     let after = judge::errors(&model, &x);

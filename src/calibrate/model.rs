@@ -11,7 +11,7 @@
 //! | distance | `|c_1 − c_2| − value` |
 
 use super::effects;
-use super::feature::Feature;
+use super::feature::{Feature, Rate};
 use super::file::Calibration;
 use super::frame::{Frame, left_jacobian_inverse, log, right_jacobian};
 use super::kin::Kin;
@@ -78,7 +78,7 @@ pub struct Model<'a> {
     /// what joints do beside turning
     pub features: Vec<Feature>,
     /// value of each feature, by row
-    pub rates: Vec<Vec<f64>>,
+    pub rates: Vec<Vec<Rate>>,
     /// all unknowns: of the robot first
     pub unknowns: Vec<Unknown>,
     /// number of unknowns of the robot

@@ -12,6 +12,7 @@
 //! take. Each row is whitened by the covariance that the noise of pose and encoder has in its residuals. The pose of
 //! given readings, needed to predict, is found by Newton on the same equations.
 
+use super::feature::{Feature, Rate};
 use super::frame::{Frame, exp, log};
 use super::serial::Posed;
 use super::unknown::{Part, Unknown};
@@ -233,11 +234,29 @@ impl Parallel {
         }
     }
 
-    /// Pose at readings `q` with errors `x`, from a pose nearby.
+    /// Readings with what the joints do beside turning: features behind the dimensions in `x`.
+    pub fn readings(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[Rate]) -> Vec<f64> {
+        let mut q = q.to_vec();
+        for (k, f) in features.iter().enumerate() {
+            q[f.joint] += x[self.errors() + k] * rate[k].turn;
+        }
+        q
+    }
+
+    /// Pose at readings `q` with errors `x` (dimensions, then one number a feature), from a pose nearby.
     ///
     /// # Errors
     /// Newton does not come to rest, or the actuators do not hold the platform.
-    pub fn pose(&self, q: &[f64], x: &[f64], near: &Frame) -> Result<Posed> {
+    pub fn pose(
+        &self,
+        q: &[f64],
+        x: &[f64],
+        features: &[Feature],
+        rate: &[Rate],
+        near: &Frame,
+    ) -> Result<Posed> {
+        let readings = self.readings(q, x, features, rate);
+        let q = &readings[..];
         let held = self.held();
         let free: Vec<usize> = (0..6)
             .filter(|k| *k < 3 || !held.contains(&(k - 3)))
@@ -282,8 +301,14 @@ impl Parallel {
             }
         }
         let a = self.actuators_at(&at, q, x, false);
-        let rates = solve(&a, &(-&a.by_errors))?;
-        let mut jacobian = DMatrix::zeros(6, self.errors());
+        let errors = self.errors();
+        let mut by = DMatrix::zeros(a.value.len(), errors + features.len());
+        by.columns_mut(0, errors).copy_from(&a.by_errors);
+        for (k, f) in features.iter().enumerate() {
+            by[(f.joint, errors + k)] = a.by_reading[f.joint] * rate[k].turn;
+        }
+        let rates = solve(&a, &(-by))?;
+        let mut jacobian = DMatrix::zeros(6, errors + features.len());
         for (k, &f) in free.iter().enumerate() {
             jacobian.row_mut(f).copy_from(&rates.row(k));
         }

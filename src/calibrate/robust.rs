@@ -2,8 +2,10 @@
 
 use super::fit::{self, Fit, Plan};
 use super::judge;
+use super::kin::Kin;
 use super::kind::Kind;
-use super::model::Model;
+use super::model::{Algorithm, Model};
+use super::unknown::Part;
 use crate::error::Result;
 
 /// Rounds of fitting and leaving out.
@@ -131,6 +133,44 @@ pub(super) fn robustly(model: &mut Model, plan: &mut Plan, x: &[f64]) -> Result<
         if still {
             break;
         }
+    }
+    Ok(fit)
+}
+
+/// Without the orientation residual, the algorithms of parallel robots do not see the tilt of camera and target against
+/// a platform that keeps its own: they stay where the turns that were seen put them in closed form.
+pub(super) fn hold_tilt(model: &Model, plan: &mut Plan, x: &mut [f64]) {
+    let Kin::Parallel(p) = model.kin else { return };
+    let seen = model.settings.orientation || model.settings.algorithm == Algorithm::Forward;
+    if seen || p.held().is_empty() {
+        return;
+    }
+    let cameras = model.layout.camera.iter().flatten().map(|c| c + 3..c + 5);
+    let targets = model.layout.target.iter().flatten().map(|t| t + 3..t + 6);
+    for k in cameras.chain(targets).flatten() {
+        plan.free[k] = false;
+        x[k] = 0.0;
+    }
+}
+
+/// Links cannot bend against their load: a flexibility that came out negative is held at zero, and the fit repeated.
+pub(super) fn stiff(model: &Model, plan: &mut Plan, mut fit: Fit) -> Result<Fit> {
+    let bending = |k: &usize| model.unknowns[*k].part == Part::Bending;
+    let all: Vec<usize> = (0..model.of_robot).filter(bending).collect();
+    for _ in 0..all.len() {
+        let mut x = fit.x.clone();
+        let mut changed = false;
+        for &k in &all {
+            if x[k] < 0.0 {
+                x[k] = 0.0;
+                plan.free[k] = false;
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+        fit = fit::solve(model, plan, &x)?;
     }
     Ok(fit)
 }

@@ -12,6 +12,8 @@ pub struct Columns {
     pub q: Vec<usize>,
     /// what was measured, in the order of [`Kind::columns`]
     pub value: Vec<usize>,
+    /// sides that the joints came from; none, or one a joint
+    pub approach: Vec<usize>,
     /// `fit` or `holdout`
     pub purpose: Option<usize>,
     /// 6 × 6 by rows
@@ -94,11 +96,19 @@ impl Columns {
             let message = "some of cov_11 … cov_66 are missing; give all 36 or none";
             return Err(source.bad(1, message));
         }
+        let sides: Vec<Option<usize>> = (1..=n).map(|k| find(&format!("approach{k}"))).collect();
+        let approach: Vec<usize> = sides.iter().flatten().copied().collect();
+        if !approach.is_empty() && approach.len() < n {
+            let message =
+                format!("some of approach1 … approach{n} are missing; give one a joint or none");
+            return Err(source.bad(1, message));
+        }
         let purpose = find("use");
         let columns = Columns {
             names,
             q,
             value,
+            approach,
             purpose,
             covariance,
         };

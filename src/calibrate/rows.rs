@@ -38,6 +38,8 @@ pub struct Row {
     pub value: Value,
     /// of position (m) and rotation vector (rad) in the camera's axes
     pub covariance: Option<Matrix6<f64>>,
+    /// side that each joint came from: 1 where its reading rose; empty where nothing is said
+    pub approach: Vec<f64>,
     /// whether unknowns are identified with it
     pub fit: bool,
 }
@@ -179,6 +181,7 @@ impl<'a> Cells<'a> {
             q,
             value: self.value(&v, solved, tally)?,
             covariance: self.covariance(solved)?,
+            approach: self.numbers(&self.columns.approach)?,
             fit: self.purpose()? == Purpose::Fit,
         }))
     }

@@ -39,6 +39,8 @@ pub struct Chosen {
     pub trials: Vec<Trial>,
 }
 
+/// Effects that are tried; how links bend must be asked for.
+const TRIED: [&str; 3] = ["joint_compliance", "encoder_eccentricity", "backlash"];
 /// An effect must lower the error of rows left out by this fraction.
 const WORTH: f64 = 0.02;
 /// And by this many standard errors, …
@@ -53,6 +55,7 @@ fn part(effect: &str) -> Part {
     match effect {
         "joint_compliance" => Part::Compliance,
         "backlash" => Part::Backlash,
+        "link_compliance" => Part::Bending,
         _ => Part::Eccentricity,
     }
 }
@@ -76,7 +79,7 @@ pub fn choose<'a>(
             trials: Vec::new(),
         });
     }
-    if super::EFFECTS.iter().all(|e| columns(e).is_empty()) {
+    if TRIED.iter().all(|e| columns(e).is_empty()) {
         return Ok(Chosen::default());
     }
     let folds = folds(input);
@@ -90,7 +93,7 @@ pub fn choose<'a>(
     let Some(mut base) = search.errors(&kept)? else {
         return Ok(Chosen::default());
     };
-    for effect in super::EFFECTS {
+    for effect in TRIED {
         if columns(effect).is_empty() {
             continue;
         }

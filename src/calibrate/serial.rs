@@ -7,7 +7,7 @@
 //! neighbouring frame expresses as well are told apart by their tolerances alone
 //! (see [`identifiable`](super::identifiable)).
 
-use super::feature::Feature;
+use super::feature::{Feature, Rate, Shape};
 use super::frame::{Frame, right_jacobian};
 use super::unknown::{Part, Unknown};
 use crate::robot::{Body, Motion};
@@ -44,6 +44,14 @@ pub struct Posed {
 }
 
 impl Arm {
+    /// Names of the joints of the chain.
+    pub fn names(&self) -> Vec<&str> {
+        self.links
+            .iter()
+            .map(|l| l.body.joint_name.as_str())
+            .collect()
+    }
+
     /// Number of geometric unknowns.
     pub fn errors(&self) -> usize {
         6 * (self.links.len() + usize::from(self.tip_joint.is_some()))
@@ -61,7 +69,7 @@ impl Arm {
     /// Shift of the frame's origin by each joint, `3 × joints`, at the errors `x` of the geometry.
     pub fn by_joints(&self, q: &[f64], x: &[f64]) -> DMatrix<f64> {
         let features: Vec<Feature> = (0..q.len()).map(Feature::turn).collect();
-        let ones = vec![1.0; q.len()];
+        let ones = vec![Rate::turn(1.0); q.len()];
         let all: Vec<f64> = x.iter().copied().chain(ones.iter().map(|_| 0.0)).collect();
         let posed = self.pose(q, &all, &features, &ones);
         posed
@@ -72,10 +80,19 @@ impl Arm {
 
     /// Pose at joint readings `q`, with errors `x` (geometry, then one number a feature). `rate` holds the value of
     /// each feature in this posture: the change of its joint per unit.
-    pub fn pose(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[f64]) -> Posed {
+    pub fn pose(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[Rate]) -> Posed {
         let n = self.errors();
         let mut j = DMatrix::zeros(6, n + features.len());
         let mut at = Frame::identity();
+        // errors of the frames, with what the links bend
+        let mut x = x.to_vec();
+        for (k, f) in features.iter().enumerate() {
+            if let Some(place) = rate[k].place {
+                for (c, v) in place.iter().enumerate() {
+                    x[6 * f.joint + c] += x[n + k] * v;
+                }
+            }
+        }
         // axis and origin of each joint, and of the frames of the errors
         let mut joints = Vec::with_capacity(self.links.len());
         let mut places = Vec::with_capacity(self.links.len() + 1);
@@ -89,8 +106,8 @@ impl Arm {
             at = at.then(&Frame::small(&x[6 * i..6 * i + 6]));
             let mut s = b.ratio * q[link.coordinate] + b.offset;
             for (k, f) in features.iter().enumerate() {
-                if f.joint == link.coordinate {
-                    s += b.ratio * x[n + k] * rate[k];
+                if f.shape != Shape::Bend && f.joint == link.coordinate {
+                    s += b.ratio * x[n + k] * rate[k].turn;
                 }
             }
             joints.push((link.coordinate, b.motion, b.ratio, at.r * b.axis, at.p));
@@ -112,7 +129,7 @@ impl Arm {
             places.push((i, at));
             at = at.then(&Frame::small(&x[6 * i..6 * i + 6]));
         }
-        let mut put = |column: usize, shift: Vector3<f64>, turn: Vector3<f64>| {
+        let put = |j: &mut DMatrix<f64>, column: usize, shift: Vector3<f64>, turn: Vector3<f64>| {
             for k in 0..3 {
                 j[(k, column)] += shift[k];
                 j[(3 + k, column)] += turn[k];
@@ -123,17 +140,31 @@ impl Arm {
             let after = before.then(&Frame::small(e));
             let turns = after.r * right_jacobian(&Vector3::new(e[3], e[4], e[5]));
             for k in 0..3 {
-                put(6 * i + k, before.r.column(k).into_owned(), Vector3::zeros());
+                put(
+                    &mut j,
+                    6 * i + k,
+                    before.r.column(k).into_owned(),
+                    Vector3::zeros(),
+                );
                 let w = turns.column(k).into_owned();
-                put(6 * i + 3 + k, w.cross(&(at.p - after.p)), w);
+                put(&mut j, 6 * i + 3 + k, w.cross(&(at.p - after.p)), w);
             }
         }
         for (k, f) in features.iter().enumerate() {
+            if f.shape == Shape::Bend {
+                let place = rate[k].place.unwrap_or_default();
+                for row in 0..6 {
+                    let own = (0..6).map(|c| j[(row, 6 * f.joint + c)] * place[c]);
+                    let sum: f64 = own.sum();
+                    j[(row, n + k)] += sum;
+                }
+                continue;
+            }
             for (_, motion, ratio, axis, origin) in joints.iter().filter(|(c, ..)| *c == f.joint) {
-                let v = axis * (ratio * rate[k]);
+                let v = axis * (ratio * rate[k].turn);
                 match motion {
-                    Motion::Revolute => put(n + k, v.cross(&(at.p - origin)), v),
-                    Motion::Prismatic => put(n + k, v, Vector3::zeros()),
+                    Motion::Revolute => put(&mut j, n + k, v.cross(&(at.p - origin)), v),
+                    Motion::Prismatic => put(&mut j, n + k, v, Vector3::zeros()),
                 }
             }
         }

@@ -36,6 +36,12 @@ struct Aligned {
 
 /// Residual beyond this fraction of the spread makes a file suspicious.
 const SUSPICIOUS: f64 = 0.08;
+/// Share of the target in what postures do not tell of camera against target: a target is near its platform, the camera
+/// is not. Half of each would put a tilt of the target on the camera's distance as a lever.
+const NEAR: f64 = 0.01;
+/// Weight of turns about an axis that is exact against that of positions, m²/rad²: 2 mm by which the robot is off at a
+/// position against 1 mrad of a camera.
+const EXACT: f64 = 4.0;
 /// An explanation must lower the residual to this fraction.
 const EXPLAINED: f64 = 0.25;
 
@@ -46,12 +52,13 @@ fn spread(points: impl Iterator<Item = Vector3<f64>> + Clone) -> (Vector3<f64>, 
     (mean, (square / n).sqrt())
 }
 
-/// Camera and target of some pairs.
-fn align(pairs: &[Pair]) -> Option<Aligned> {
+/// Camera and target of some pairs. `exact`: the axis that the frame turns about is the robot's and no matter of
+/// tolerances, so that turns tell the tilt of the camera better than positions do.
+fn align(pairs: &[Pair], exact: bool) -> Option<Aligned> {
     let mut kept: Vec<Pair> = pairs.to_vec();
     let mut result = None;
     for _ in 0..3 {
-        let found = once(&kept, pairs)?;
+        let found = once(&kept, pairs, exact)?;
         let mut errors: Vec<(f64, Pair)> =
             pairs.iter().map(|p| (distance(&found, p), *p)).collect();
         errors.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -70,7 +77,7 @@ fn distance(a: &Aligned, p: &Pair) -> f64 {
     (seen.p - p.seen).norm() + a.spread * turn
 }
 
-fn once(pairs: &[Pair], all: &[Pair]) -> Option<Aligned> {
+fn once(pairs: &[Pair], all: &[Pair], exact: bool) -> Option<Aligned> {
     let n = pairs.len();
     if n < 3 {
         return None;
@@ -89,7 +96,13 @@ fn once(pairs: &[Pair], all: &[Pair]) -> Option<Aligned> {
                 if let (Some(a), Some(b)) = (p.turned, other.turned) {
                     let seen = log(&(a * b.transpose()));
                     let base = log(&(p.base.r * other.base.r.transpose()));
-                    m += seen * base.transpose() * (size * size).max(1e-6);
+                    m += seen
+                        * base.transpose()
+                        * if exact {
+                            EXACT
+                        } else {
+                            (size * size).max(1e-6)
+                        };
                 }
             }
         }
@@ -109,13 +122,16 @@ fn once(pairs: &[Pair], all: &[Pair]) -> Option<Aligned> {
             for i in 0..3 {
                 a[(3 * k + i, i)] = 1.0;
                 for j in 0..3 {
-                    a[(3 * k + i, 3 + j)] = turned[(i, j)];
+                    a[(3 * k + i, 3 + j)] = NEAR * turned[(i, j)];
                 }
                 b[3 * k + i] = rest[i];
             }
         }
-        let x = a.svd(true, true).solve(&b, 1e-6 * (n as f64).sqrt()).ok()?;
-        let next = Vector3::new(x[3], x[4], x[5]);
+        let x = a
+            .svd(true, true)
+            .solve(&b, 1e-6 * NEAR * (n as f64).sqrt())
+            .ok()?;
+        let next = Vector3::new(x[3], x[4], x[5]) * NEAR;
         let change = (next - target.p).norm();
         camera.p = Vector3::new(x[0], x[1], x[2]);
         target.p = next;
@@ -262,7 +278,8 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
                 };
             }
             let about = |why: String| Error::file(&input.path, measured.file.clone(), why);
-            let Some(found) = align(&pairs) else {
+            let exact = matches!(kin, Kin::Parallel(p) if p.held().len() == 2);
+            let Some(found) = align(&pairs, exact) else {
                 return Err(about(format!(
                     "{} usable rows for the {}; at least 3 different ones are needed to find where it stands",
                     pairs.len(),
@@ -278,7 +295,7 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
             if found.error > SUSPICIOUS * found.spread {
                 let best = explanations(&pairs, degrees)
                     .into_iter()
-                    .filter_map(|(why, pairs)| Some((align(&pairs)?, why)))
+                    .filter_map(|(why, pairs)| Some((align(&pairs, exact)?, why)))
                     .min_by(|a, b| (a.0.error / a.0.spread).total_cmp(&(b.0.error / b.0.spread)));
                 if let Some((other, why)) = best
                     && other.error / other.spread < EXPLAINED * found.error / found.spread

@@ -8,10 +8,14 @@ pub enum Part {
     Geometry,
     /// how joints give way under gravity
     Compliance,
+    /// how links bend under gravity
+    Bending,
     /// error of a joint that repeats with its turn
     Eccentricity,
     /// dead play that gravity closes to one side
     Backlash,
+    /// zero of a joint, where it is looked at alone
+    Offset,
     /// pose of the base in the camera's (or tracker's) frame
     Camera,
     /// pose of the target on the tool or platform
@@ -64,7 +68,12 @@ impl Unknown {
     pub fn of_robot(&self) -> bool {
         matches!(
             self.part,
-            Part::Geometry | Part::Compliance | Part::Eccentricity | Part::Backlash
+            Part::Geometry
+                | Part::Compliance
+                | Part::Bending
+                | Part::Eccentricity
+                | Part::Backlash
+                | Part::Offset
         )
     }
 }

@@ -1,5 +1,7 @@
 //! `excite diagnose EXPERIMENT`.
 
+mod poses;
+
 use super::{Folder, into, outside, pretty, print, unwritten, warn};
 use excite::Result;
 use excite::diagnose::{Settings, diagnose, json, page};
@@ -17,12 +19,14 @@ use std::time::{Duration, Instant};
     long_about = "Diagnose the gap between a model and its robot: where it lies, which effect causes it, how far it shrinks \
                   once that effect is added, and what to run next.\n\nReads experiment.toml (robot, logs, which are fitted and \
                   which only predicted). Writes diagnosis.json and report.html; robot.toml, robot.urdf and robot.xml (MuJoCo) \
-                  with the improved model, and effects.py where MuJoCo has no element for an effect; next.json, the motion that tells rivals apart or shows what these records cannot, of the joints or of the platform.",
+                  with the improved model, and effects.py where MuJoCo has no element for an effect; next.json, the motion that tells rivals apart or shows what these records cannot, of the joints or of the platform.\n\nOf a \
+                  calibration.toml it says which kinematic effect the robot file lacks, and writes diagnosis.json, report.html and \
+                  next.csv, postures that tell rivals apart.",
     after_help = "Examples:\n  excite diagnose experiment.toml\n  excite diagnose experiment.toml --output gap --json\n  excite \
-                  diagnose experiment.toml --no-next"
+                  diagnose experiment.toml --no-next\n  excite diagnose calibration.toml --output gap"
 )]
 pub struct Args {
-    /// experiment.toml: the robot and its logs
+    /// experiment.toml: the robot and its logs; or calibration.toml: the robot and what was seen of its tool
     experiment: PathBuf,
     /// Directory for the results
     #[arg(short, long, default_value = "out")]
@@ -42,24 +46,31 @@ pub struct Args {
     no_next: bool,
     /// Random steps by which the best design of that motion is improved; counted, so that the same seed
     /// gives the same motion
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    next_tries: usize,
+    #[arg(
+        long,
+        value_name = "N",
+        help = "Random steps by which the best design of that motion is improved; counted, so that the same seed gives the same motion [default: 64]"
+    )]
+    next_tries: Option<usize>,
     /// Seed of the random starts of that design
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
-    /// relative to it
-    #[arg(long, value_name = "PA", default_value_t = 101_325.0)]
-    atmosphere: f64,
+    /// relative to it [default: 101325]
+    #[arg(long, value_name = "PA")]
+    atmosphere: Option<f64>,
     /// Print diagnosis.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: Args) -> Result<()> {
+    if excite::calibrate::is_calibration(&args.experiment) {
+        return poses::run(args);
+    }
     let begin = Instant::now();
     let mut experiment = Experiment::read(&args.experiment)?;
-    experiment.press(outside(args.atmosphere)?)?;
+    experiment.press(outside(args.atmosphere.unwrap_or(101_325.0))?)?;
     let mut names = vec!["diagnosis.json", "report.html", "next.json"];
     names.extend(export::files(&experiment.plant));
     let further = export::further(&args.also, &experiment.plant)?;
@@ -69,7 +80,7 @@ pub fn run(args: Args) -> Result<()> {
     let folder = Folder::new(&args.output, &names, args.force)?;
     let settings = Settings {
         next: !args.no_next,
-        next_tries: args.next_tries.min(10_000),
+        next_tries: args.next_tries.unwrap_or(64).min(10_000),
         seed: args.seed,
     };
     // drawn only where standard error is a terminal

@@ -15,7 +15,8 @@ use std::path::PathBuf;
                   readings, in an order with a short way), report.json and report.html, which compares them with \
                   random ones.",
     after_help = "Examples:\n  excite poses ur5e --count 40\n  excite poses h4 --count 45 --std 0.0003 --angle-std \
-                  0.00035 --rehearse 1\n  excite poses panda --kind point --point 0.5,0,0.1 --point 0.4,0.3,0.1"
+                  0.00035 --rehearse 1\n  excite poses panda --kind point --point 0.5,0,0.1 --point 0.4,0.3,0.1\n  excite poses \
+                  ur5e --camera 0.5,0,1.6,0.5,0,0.3 --view 50 --range 0.5,2"
 )]
 pub struct Args {
     /// Robot: a robot.toml, a URDF, or the name of a bundled one
@@ -52,6 +53,34 @@ pub struct Args {
         allow_hyphen_values = true
     )]
     within: Vec<f64>,
+    /// Place of a fixed camera and a point that it looks at, x,y,z,x,y,z in the base, m: the target must be in its view and
+    /// range and face it, with no volume of the robot in between
+    #[arg(
+        long,
+        value_name = "CAMERA",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    camera: Vec<f64>,
+    /// Angle of the camera's view, a cone, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 40.0, requires = "camera")]
+    view: f64,
+    /// Nearest and farthest distance at which the target is read, m
+    #[arg(long, value_name = "NEAR,FAR", value_delimiter = ',', default_values_t = [0.2, 3.0], requires = "camera")]
+    range: Vec<f64>,
+    /// Place of the target on the frame, x,y,z, and normal of its face, x,y,z, in the frame's axes
+    #[arg(
+        long,
+        value_name = "TARGET",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        default_values_t = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        requires = "camera"
+    )]
+    target: Vec<f64>,
+    /// Largest angle between that normal and the line to the camera, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 60.0, requires = "camera")]
+    facing: f64,
     /// Noise of a measured position, m
     #[arg(long, value_name = "M", default_value_t = 0.0003)]
     std: f64,
@@ -131,6 +160,7 @@ pub fn run(args: Args) -> Result<()> {
         }
         _ => None,
     };
+    let sight = sight(&args)?;
     let mut opened = calibrate::open(&args.robot, args.frame.as_deref())?;
     opened.plant = args.collisions.apply(opened.plant);
     let request = poses::Request {
@@ -142,6 +172,7 @@ pub fn run(args: Args) -> Result<()> {
             .map(Vector3::from_column_slice)
             .collect(),
         region,
+        sight,
         std: [args.std, args.angle_std],
         tolerances: Tolerances {
             length: args.length,
@@ -192,4 +223,51 @@ pub fn run(args: Args) -> Result<()> {
         out += &format!("wrote {}\n", f.display());
     }
     print(&out)
+}
+
+/// The camera that is asked for.
+fn sight(args: &Args) -> Result<Option<poses::Sight>> {
+    let [a, b, c, d, e, f] = args.camera[..] else {
+        return match args.camera.is_empty() {
+            true => Ok(None),
+            false => Err(Error::Argument(
+                "--camera takes six numbers separated by commas: its place, and a point that it looks at".into(),
+            )),
+        };
+    };
+    let wrong = |what: &str| Err(Error::Argument(what.into()));
+    let all = args.camera.iter().chain(&args.range).chain(&args.target);
+    if !all.chain([&args.view, &args.facing]).all(|v| v.is_finite()) {
+        return wrong("--camera, --range, --target, --view and --facing take finite numbers");
+    }
+    let [x, y, z, nx, ny, nz] = args.target[..] else {
+        return wrong(
+            "--target takes six numbers separated by commas: its place on the frame, and its normal",
+        );
+    };
+    let (camera, towards) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+    let normal = Vector3::new(nx, ny, nz);
+    if !(normal.norm() > 1e-6 && (towards - camera).norm() > 1e-6) {
+        return wrong(
+            "--camera: its place and the point that it looks at must differ; --target: its normal must not vanish",
+        );
+    }
+    let [near, far] = args.range[..] else {
+        return wrong("--range takes two numbers separated by a comma");
+    };
+    if !(0.0 <= near && near < far) {
+        return wrong("--range: the nearest distance must be below the farthest, and not negative");
+    }
+    if !(args.view > 0.0 && args.view < 180.0 && args.facing > 0.0 && args.facing <= 90.0) {
+        return wrong("--view is between 0 and 180 degrees, --facing above 0 and at most 90");
+    }
+    Ok(Some(poses::Sight {
+        camera,
+        towards,
+        half_view: 0.5 * args.view.to_radians(),
+        range: [near, far],
+        target: Vector3::new(x, y, z),
+        normal: normal.normalize(),
+        facing: args.facing.to_radians(),
+    }))
 }

@@ -7,6 +7,7 @@ mod controller;
 mod findings;
 mod next;
 mod parallel;
+mod poses;
 mod real;
 mod simulators;
 mod thresholds;

@@ -1,6 +1,6 @@
 //! Postures that the robot can take.
 
-use super::Request;
+use super::{Request, Sight};
 use crate::calibrate::frame::Frame;
 use crate::calibrate::kin::Kin;
 use crate::calibrate::kind::Kind;
@@ -99,6 +99,14 @@ impl<'a> Search<'a> {
                 (box_, p.mechanism.pairs())
             }
         };
+        let looked_through = scene.is_some() && matches!(opened.kin, Kin::Arm(_));
+        if request.sight.is_some() && !looked_through {
+            warnings.push(Warning::new(
+                WarningKind::CollisionNotChecked,
+                plant.name(),
+                "no volume of it is looked at: arms or legs may stand between target and camera",
+            ));
+        }
         let zeros = vec![0.0; opened.kin.errors()];
         Ok(Search {
             opened,
@@ -200,7 +208,11 @@ impl<'a> Search<'a> {
         let inside = |region: &[[f64; 2]; 3]| {
             (0..3).all(|k| (region[k][0]..=region[k][1]).contains(&candidate.frame.p[k]))
         };
-        if self.request.region.as_ref().is_some_and(|r| !inside(r)) || !self.clear(&candidate.q) {
+        let seen = |s: &Sight| s.sees(&candidate.frame);
+        if self.request.region.as_ref().is_some_and(|r| !inside(r))
+            || self.request.sight.as_ref().is_some_and(|s| !seen(s))
+            || !self.clear(&candidate)
+        {
             return None;
         }
         Some(candidate)
@@ -234,8 +246,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Whether nothing touches.
-    fn clear(&self, q: &[f64]) -> bool {
+    /// Whether nothing touches, and nothing stands between the target and a camera.
+    fn clear(&self, candidate: &Candidate) -> bool {
         let Some((scene, balls)) = &self.scene else {
             return true;
         };
@@ -248,11 +260,30 @@ impl<'a> Search<'a> {
                 0.0f64.clamp(a, b)
             })
             .collect();
-        for (&j, v) in self.opened.indices.iter().zip(q) {
+        for (&j, v) in self.opened.indices.iter().zip(&candidate.q) {
             all[j] = *v;
         }
         let mut poses = Vec::new();
         append_poses(robot, &all, &mut poses);
+        let hidden = |s: &Sight| match &self.opened.kin {
+            Kin::Arm(arm) => {
+                let last = arm.links.last().map(|l| l.body.name.as_str());
+                let carrier = robot
+                    .bodies
+                    .iter()
+                    .position(|b| Some(b.name.as_str()) == last);
+                !s.free(
+                    &candidate.frame,
+                    scene,
+                    &poses,
+                    carrier.unwrap_or(usize::MAX),
+                )
+            }
+            Kin::Parallel(_) => false,
+        };
+        if self.request.sight.as_ref().is_some_and(hidden) {
+            return false;
+        }
         scene.pairs.iter().all(|pair| {
             balls.lower_bound(pair, &poses) > pair.margin
                 || scene.separation(pair, &poses).distance > pair.margin

@@ -12,13 +12,15 @@
 //! exchange, then by small steps of single postures. Last they are put in an order with a short way. For sockets the
 //! rigid motions of all predictions together are taken out of `L`: no contact tells where the base stands.
 
-mod candidates;
+pub(super) mod candidates;
 mod criterion;
 mod order;
 pub mod page;
 mod rehearse;
+mod sight;
 
 pub use rehearse::{rehearse, toml};
+pub use sight::Sight;
 
 use super::file::{Calibration, Measurement, Tolerances};
 use super::frame::Frame;
@@ -46,6 +48,8 @@ pub struct Request {
     pub points: Vec<Vector3<f64>>,
     /// what the frame's origin must stay in, base axes, m: what the camera sees
     pub region: Option<[[f64; 2]; 3]>,
+    /// a fixed camera that must see the target
+    pub sight: Option<Sight>,
     /// noise of the measurement, m and rad
     pub std: [f64; 2],
     /// manufacturing tolerances
@@ -81,6 +85,8 @@ pub struct Poses {
     pub way: [f64; 2],
     /// candidates that were found, of so many draws
     pub found: [usize; 2],
+    /// the camera that sees them
+    pub sight: Option<Sight>,
     /// what was imperfect
     pub warnings: Vec<Warning>,
 }
@@ -112,8 +118,9 @@ pub fn choose(opened: &Opened, request: &Request) -> Result<Poses> {
     let (found, draws) = search.draw(&mut rng, wanted.max(2 * request.count));
     if found.len() < request.count {
         return Err(Error::Infeasible(format!(
-            "{}: of {draws} random postures {} are inside the limits, free of collision and where they are wanted; {} \
-             were asked for. Widen the region or the limits, move the points, or ask for fewer",
+            "{}: of {draws} random postures {} are inside the limits, free of collision and where they are wanted or \
+             seen; {} were asked for. Widen the region, the view or the limits, move the points or the camera, or ask for \
+             fewer",
             opened.plant.name(),
             found.len(),
             request.count
@@ -161,6 +168,7 @@ pub fn choose(opened: &Opened, request: &Request) -> Result<Poses> {
         before: problem.value(&[]),
         course,
         found: [found.len(), draws],
+        sight: request.sight.clone(),
         warnings: search.warnings,
     })
 }
@@ -194,7 +202,7 @@ fn refine(
 }
 
 /// A calibration whose rows are the candidates.
-fn calibration(opened: &Opened, request: &Request, found: &[Candidate]) -> Calibration {
+pub(super) fn calibration(opened: &Opened, request: &Request, found: &[Candidate]) -> Calibration {
     let files = request.points.len().max(1);
     let measurements = (0..files)
         .map(|k| Measurement {
@@ -218,6 +226,7 @@ fn calibration(opened: &Opened, request: &Request, found: &[Candidate]) -> Calib
             _ => Value::Contact,
         },
         covariance: None,
+        approach: Vec::new(),
         fit: true,
     };
     Calibration {
@@ -280,6 +289,7 @@ impl Poses {
             "way_unordered": self.way[1],
             "candidates": of(0),
             "draws": of(1),
+            "sight": self.sight.as_ref().map(Sight::json),
             "warnings": self.warnings,
         })
     }

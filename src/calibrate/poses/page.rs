@@ -106,7 +106,8 @@ pub fn html(found: &Poses) -> String {
                 (significant(found.way[0], 3)) " of the joint that moves most, " (significant(found.way[1], 3))
                 " in the order they were found."
             }))
-            p { (found.found[0]) " candidates of " (found.found[1]) " draws are inside the limits and free of collision." }
+            p { (found.found[0]) " candidates of " (found.found[1]) " draws are inside the limits and free of collision"
+                @if found.sight.is_some() { ", with the target in view of the camera and facing it" } "." }
         },
     ));
     let head: Vec<String> = std::iter::once("posture".to_string())
