@@ -20,21 +20,12 @@ if TYPE_CHECKING:
     from ._condense import Factor, Merged, condense, merge
     from ._errors import Error, ExciteWarning, Notice
     from ._excite import __version__
+    from ._planned import Assessment, Design, Export, Interrupted, Simulation
     from ._posterior import Posterior
     from ._records import Experiment, Record
-    from ._results import (
-        Assessment,
-        Calibration,
-        Design,
-        Diagnosis,
-        Export,
-        Identification,
-        Interrupted,
-        Load,
-        Result,
-        Simulation,
-    )
+    from ._results import Calibration, Diagnosis, Identification, Load, Result
     from ._robot import BaseParameters, Parameter, Robot
+    from ._simulate import simulate
     from ._trajectory import Motion, Samples, Trajectory
     from ._verbs import (
         assess,
@@ -46,7 +37,6 @@ if TYPE_CHECKING:
         identify,
         load,
         robots,
-        simulate,
     )
     from ._verify import Verification, verify
 
@@ -58,13 +48,12 @@ _PARTS = {
     "_excite": ("__version__",),
     "_posterior": ("Posterior",),
     "_records": ("Experiment", "Record"),
-    "_results": (
-        "Assessment", "Calibration", "Design", "Diagnosis", "Export", "Identification", "Interrupted", "Load", "Result",
-        "Simulation",
-    ),
+    "_planned": ("Assessment", "Design", "Export", "Interrupted", "Simulation"),
+    "_results": ("Calibration", "Diagnosis", "Identification", "Load", "Result"),
     "_robot": ("BaseParameters", "Parameter", "Robot"),
+    "_simulate": ("simulate",),
     "_trajectory": ("Motion", "Samples", "Trajectory"),
-    "_verbs": ("assess", "calibrate", "design", "diagnose", "export", "formats", "identify", "load", "robots", "simulate"),
+    "_verbs": ("assess", "calibrate", "design", "diagnose", "export", "formats", "identify", "load", "robots"),
     "_verify": ("Verification", "verify"),
 }
 

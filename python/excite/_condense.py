@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, Dict, Iterable, List, Optional, Sequence, Union
 
 from . import _excite
+from ._arguments import ExperimentLike, RobotLike, _pressure, _real_or_none, _robot
 from ._arrays import Array
 from ._errors import emit, notices, unusable
 from ._records import as_experiment
 from ._results import _floats, _Model
 from ._robot import PathLike, Robot, _names
-from ._verbs import ExperimentLike, RobotLike, _pressure, _real_or_none, _robot
 
 
 class Factor:

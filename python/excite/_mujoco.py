@@ -7,11 +7,11 @@ import math
 import tempfile
 from pathlib import Path
 from types import ModuleType
-from typing import Any, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
 
-from ._arrays import Array
+from ._arrays import Array, from_columns
 from ._command import Command
 from ._errors import unusable
 
@@ -62,6 +62,9 @@ class Model:
         # what is not in the file costs no time in every step
         self._displaced = bool(getattr(self._effects, "DISPLACED", []))
         self._driven = any(not native for _, _, native in getattr(self._effects, "DRIVES", []))
+        #: what goes on from one record to the next, and its state where each record begins
+        self.lasting: List[str] = list(getattr(self._effects, "LASTING", []))
+        self.begins: Dict[int, Dict[str, Any]] = {}
         #: whether something in it goes on by itself, so that a run needs a time before it
         self.remembers = self._model.nv > len(joints) or bool(getattr(self._effects, "REMEMBERED", []))
 
@@ -75,11 +78,13 @@ class Model:
             found.append(int(own[0]))
         return np.array(found)
 
-    def inverse(self, q: Array, dq: Array, ddq: Array, dt: float) -> Array:
-        """Torque that the drives report along a motion, ``(samples, joints)``."""
+    def inverse(self, q: Array, dq: Array, ddq: Array, dt: float, memory: Optional[Dict[str, Any]] = None) -> Array:
+        """Torque that the drives report along a motion, ``(samples, joints)``; ``memory`` is carried on."""
         self._model.opt.timestep = self._own_step
         if self._effects is not None:
-            return np.asarray(self._effects.inverse(self._model, q, dq, ddq, dt), float)
+            if memory is not None:
+                memory.update({**self._effects.start(q[0]), **{k: memory[k] for k in self.lasting if k in memory}})
+            return np.asarray(self._effects.inverse(self._model, q, dq, ddq, dt, memory), float)
         mj, data = self._mj, self._mj.MjData(self._model)
         tau = np.zeros_like(q)
         for i in range(len(q)):
@@ -92,20 +97,53 @@ class Model:
         out: Array = tau / gains
         return out
 
-    def run(self, q0: Array, dq0: Array, command: Command, dt: float, before: Optional[Command] = None) -> Array:
-        """Positions under a command, one row for each of its samples; ``before`` is played first."""
+    def along(self, records: List[Any], joints: int) -> List[Array]:
+        """``inverse`` along all records; what lasts goes from one to the next in the order of the experiment."""
+        memory: Dict[str, Any] = {}
+        out = {}
+        for k in sorted(range(len(records)), key=lambda k: int(records[k]["order"])):
+            r = records[k]
+            q, dq, ddq = (from_columns(r[name], joints) for name in ("q", "dq", "ddq"))
+            self.begins[int(r["order"])] = {key: memory[key] for key in self.lasting if key in memory}
+            out[k] = self.inverse(q, dq, ddq, r["dt"], memory)
+        return [out[k] for k in range(len(records))]
+
+    def lasts(self, order: int, q: Array, dq: Array, dt: float) -> Dict[str, Any]:
+        """State of what lasts behind the first samples of the record that is number ``order`` of the experiment."""
+        effects = self._effects
+        if effects is None or not self.lasting:
+            return {}
+        memory = {**effects.start(q[0] if len(q) else np.zeros(len(self._at))), **self.begins.get(order, {})}
+        for x, v in zip(q, dq):
+            memory = effects.parts(x, v, np.zeros_like(x), dt, memory)[2]
+        return {key: memory[key] for key in self.lasting}
+
+    def run(
+        self,
+        q0: Array,
+        dq0: Array,
+        command: Command,
+        dt: float,
+        before: Optional[Command] = None,
+        lasting: Optional[Dict[str, Any]] = None,
+    ) -> Array:
+        """Positions under a command, one row for each of its samples; ``before`` is played first. ``lasting`` is the
+        state of what lasts."""
         mj, effects = self._mj, self._effects
         steps = max(int(math.ceil(dt / STEP - 1e-9)), 1)
         self._model.opt.timestep = dt / steps
         data = mj.MjData(self._model)
         previous = mj.get_mjcb_passive()
         try:
-            if effects is not None:
-                effects.install(self._model)
+            installed = None if effects is None else effects.install(self._model)
+            first = [q0, dq0] if before is None else [before.q[0], before.dq[0]]
+            self._set(data, *first)
+            if installed is not None and lasting:
+                time, memory = installed.memory[data._address]
+                installed.memory[data._address] = (time, {**memory, **lasting})
             if before is not None:
-                self._set(data, before.q[0], before.dq[0])
                 self._play(data, before, steps)
-            self._set(data, q0, dq0)
+                self._set(data, q0, dq0)
             return self._play(data, command, steps)
         finally:
             mj.set_mjcb_passive(previous)

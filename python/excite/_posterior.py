@@ -64,7 +64,9 @@ def ten_of(j: Array) -> Array:
 class Posterior:
     """Samples of what the data and the prior leave open. Made by :meth:`excite.Identification.sample`."""
 
-    def __init__(self, robot: Robot, names: List[str], units: List[str], values: Array, best: Array) -> None:
+    def __init__(
+        self, robot: Robot, names: List[str], units: List[str], values: Array, best: Array, inflation: float
+    ) -> None:
         #: the identified robot
         self.robot = robot
         #: names of the parameters
@@ -75,6 +77,8 @@ class Posterior:
         self.values = values
         #: the identified values, ``(p,)``
         self.best = best
+        #: factor on the variances because what the model leaves is correlated in time
+        self.inflation = inflation
 
     def __len__(self) -> int:
         return len(self.values)
@@ -113,8 +117,9 @@ class Posterior:
     def coverage(self, experiment: "Union[Experiment, PathLike]", level: float = 0.95) -> Dict[str, Any]:
         """How much of the held-out torque lies in the band of the samples.
 
-        The band is that of the samples and of what the identified model leaves on the fitted records: noise, and what the
-        model lacks. ``width`` is the width of the samples' band alone beside that of ±20 % on every parameter.
+        The band is that of the samples and of what the model leaves on motion that it was not fitted to: noise, and what the
+        model lacks. That is measured with halves of the fitted records, each predicted by the base parameters that the
+        others give (``noise``, N m or N, without what those parameters do not know). ``width`` is the width of the samples' band alone beside that of ±20 % on every parameter.
         """
         from statistics import NormalDist
 
@@ -127,6 +132,8 @@ class Posterior:
         rng = np.random.default_rng(0)
         twenty = self.best * rng.uniform(0.8, 1.2, self.values.shape)
         parts: Dict[bool, List[Tuple[Array, Array, Array]]] = {False: [], True: []}
+        halves: List[Tuple[Array, Array]] = []
+        kept = self.robot.base().kept
         for r in raw["records"]:
             q, dq, ddq, tau = (from_columns(r[k], len(joints)) for k in ("q", "dq", "ddq", "tau"))
             good = np.flatnonzero(np.array(r["measured"]))
@@ -137,9 +144,12 @@ class Posterior:
             left = tau[good] - y @ self.best - known
             wide, usual = (np.einsum("sjp,np->nsj", y, v - v.mean(0), optimize=True).std(0) for v in (self.values, twenty))
             parts[bool(r["holdout"])].append((left, wide, usual))
+            if not r["holdout"]:
+                middle = len(good) // 2
+                halves += [(y[:middle][:, :, kept], left[:middle]), (y[middle:][:, :, kept], left[middle:])]
         if not parts[True] or not parts[False]:
             raise unusable("coverage needs records to fit and records held out")
-        noise = np.sqrt(np.mean(np.concatenate([p[0] for p in parts[False]]) ** 2, axis=0))
+        noise = _lacking(halves, self.inflation)
         left, wide, usual = (np.concatenate(x) for x in zip(*parts[True]))
         inside = np.abs(left) <= factor * np.sqrt(wide**2 + noise**2)
         return {
@@ -154,6 +164,30 @@ class Posterior:
 
     def __repr__(self) -> str:
         return f"<excite.Posterior of {self.robot.name}: {len(self)} samples of {len(self.names)} parameters>"
+
+
+def _lacking(parts: "List[Tuple[Array, Array]]", inflation: float) -> Array:
+    """Root mean square of what a model leaves on parts of records that its base parameters were not fitted to, without
+    what these do not know: at least what is left where all are fitted."""
+    inside = np.sqrt(np.mean(np.concatenate([left for _, left in parts]) ** 2, axis=0))
+    weight = 1.0 / np.maximum(inside, 1e-300)
+    grams, rights = [], []
+    for y, left in parts:
+        rows, b = (y * weight[:, None]).reshape(-1, y.shape[2]), (left * weight).reshape(-1)
+        grams.append(rows.T @ rows)
+        rights.append(rows.T @ b)
+    total, right = np.sum(grams, axis=0), np.sum(rights, axis=0)
+    power, known = np.zeros(len(inside)), np.zeros(len(inside))
+    for (y, left), gram, b in zip(parts, grams, rights):
+        rest = total - gram
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(rest), 1e-300))
+        inverse = np.linalg.pinv(rest * np.outer(scale, scale), rcond=1e-10, hermitian=True) * np.outer(scale, scale)
+        error = left - y @ (inverse @ (right - b))
+        power += np.sum(error**2, axis=0)
+        known += np.einsum("sjp,pq,sjq->j", y, inverse, y, optimize=True)
+    rows = sum(len(left) for _, left in parts)
+    out: Array = np.sqrt(np.maximum((power - inflation * known) / rows, inside**2))
+    return out
 
 
 def sample(model: "Identification", n: int, seed: int) -> Posterior:
@@ -173,8 +207,9 @@ def sample(model: "Identification", n: int, seed: int) -> Posterior:
     values, vectors = np.linalg.eigh(0.5 * (model.base_covariance + model.base_covariance.T))
     white = (vectors / np.sqrt(np.maximum(values, 1e-14 * values.max()))).T @ t
     rng = np.random.default_rng(seed)
+    inflation = max(float(model.to_dict()["variance_inflation"]), 1.0)
     rows = [_one(best, coordinates, jacobian, white, strength, rng) for _ in range(n)]
-    return Posterior(robot, names, [p["unit"] for p in listed], np.array(rows), best)
+    return Posterior(robot, names, [p["unit"] for p in listed], np.array(rows), best, inflation)
 
 
 def _one(

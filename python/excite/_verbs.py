@@ -5,34 +5,29 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, Mapping, Optional, Sequence, Union
 
 from . import _excite
+from ._arguments import (
+    ExperimentLike,
+    RobotLike,
+    TrajectoryLike,
+    _integer,
+    _numbers,
+    _optional,
+    _pressure,
+    _real,
+    _real_or_none,
+    _robot,
+)
 from ._arrays import vector
 from ._errors import emit, unusable
+from ._planned import Assessment, Design, Export, Interrupted
 from ._progress import Bar, Progress
-from ._records import Experiment, as_experiment
-from ._results import (
-    CONTROLLERS,
-    Assessment,
-    Calibration,
-    Design,
-    Diagnosis,
-    Export,
-    Identification,
-    Interrupted,
-    Load,
-    Simulation,
-)
-from ._robot import PathLike, Robot, _names
+from ._records import as_experiment
+from ._results import CONTROLLERS, Calibration, Diagnosis, Identification, Load
+from ._robot import PathLike, _names
 from ._trajectory import Motion, Trajectory, as_trajectory
-
-RobotLike = Union[Robot, PathLike]
-TrajectoryLike = Union[Trajectory, Design, PathLike, Dict[str, Any]]
-ExperimentLike = Union[Experiment, PathLike]
-#: A value of all joints, or of some by their names.
-PerJoint = Union[None, float, Sequence[float], Mapping[str, Union[float, Sequence[float]]]]
-
 
 def robots() -> Dict[str, str]:
     """Names of the bundled robots, and what they are."""
@@ -42,46 +37,6 @@ def robots() -> Dict[str, str]:
 def formats() -> Dict[str, str]:
     """Formats of controllers that :func:`export` writes, and what they are."""
     return dict(_excite.formats())
-
-
-def _robot(value: RobotLike) -> Robot:
-    if isinstance(value, Robot):
-        return value
-    if isinstance(value, (str, os.PathLike)):
-        return Robot.load(value)
-    raise unusable(f"a robot is an excite.Robot, a path or a bundled name, not {type(value).__name__}")
-
-
-def _integer(name: str, value: Any, least: int = 0) -> int:
-    try:
-        number = int(value)
-        if number != value or number < least or number >= 2**32:
-            raise ValueError
-        return number
-    except (TypeError, ValueError):
-        raise unusable(f"{name} must be a whole number of at least {least}, not {value!r}") from None
-
-
-def _optional(name: str, value: Any, least: int = 0) -> Optional[int]:
-    return None if value is None else _integer(name, value, least)
-
-
-def _real(name: str, value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise unusable(f"{name} must be a number, not {value!r}") from None
-
-
-def _pressure(value: Any) -> float:
-    pressure = _real("atmosphere", value)
-    if not 0 <= pressure < float("inf"):
-        raise unusable(f"atmosphere is a pressure in Pa, not {value}")
-    return pressure
-
-
-def _real_or_none(name: str, value: Any) -> Optional[float]:
-    return None if value is None else _real(name, value)
 
 
 def design(
@@ -217,126 +172,6 @@ def assess(
     if load is not None and text is None:
         raise unusable("a payload is told by a trajectory: state one")
     result = Assessment(_excite.assess(own._plant, text, load))
-    emit(result.warnings)
-    return result
-
-
-def _effect(name: str, value: Any) -> List[str]:
-    """An effect as the program states it: ``[JOINT=]NUMBERS``."""
-    if value is None:
-        return []
-    if isinstance(value, Mapping):
-        return [f"{joint}={_numbers(name, v)}" for joint, v in value.items()]
-    return [_numbers(name, value)]
-
-
-def _numbers(name: str, value: Any) -> str:
-    listed = vector(name, [value] if _scalar(value) else value)
-    return ",".join(repr(float(x)) for x in listed)
-
-
-def _scalar(value: Any) -> bool:
-    try:
-        float(value)
-        return True
-    except (TypeError, ValueError):
-        return False
-
-
-def simulate(
-    robot: RobotLike,
-    trajectory: TrajectoryLike,
-    *,
-    periods: Optional[int] = None,
-    lead_in: int = 1,
-    rate: float = 1000.0,
-    step: float = 2.5e-4,
-    controller: str = "feedforward",
-    bandwidth: float = 10.0,
-    damping: float = 1.0,
-    noise: float = 1.0,
-    seed: int = 0,
-    derivatives: bool = False,
-    pose: bool = False,
-    payload: Any = None,
-    stribeck_friction: PerJoint = None,
-    nonlinear_viscous_friction: PerJoint = None,
-    friction_asymmetry: PerJoint = None,
-    load_dependent_friction: PerJoint = None,
-    torque_constant: PerJoint = None,
-    joint_offset: PerJoint = None,
-    torque_delay: float = 0.0,
-    gravity_direction: Optional[Tuple[float, float]] = None,
-    perturb: float = 0.0,
-    monte_carlo: Optional[int] = None,
-    progress: Progress = None,
-) -> Simulation:
-    """Rehearse an experiment: the robot under a controller, and the log that it would write (``excite simulate``).
-
-    An effect is a number for all joints, or a dictionary by joint: ``joint_offset={"j3": 0.01}``.
-
-    Args:
-        robot, trajectory: what moves, and how.
-        periods: to log; as in the trajectory where left out.
-        lead_in: periods before the log begins.
-        rate: samples a second, Hz.
-        step: largest step of the integrator, s.
-        controller: ``"feedforward"`` or ``"pd"``.
-        bandwidth: natural frequency of the tracking error, Hz.
-        damping: its damping ratio.
-        noise: factor on the torque noise of the robot file; 0: ideal sensors.
-        seed: of everything random.
-        derivatives: whether the record has true velocities and accelerations.
-        pose: whether it has the true pose of the platform (parallel robots).
-        payload: load on the last body or platform: mass (kg), centre (m), and tensor about it (xx, xy, xz, yy, yz, zz,
-            kg m²): 4 or 10 numbers.
-        stribeck_friction: force beyond Coulomb friction (N m or N) and velocity at which it has fallen to 1/e.
-        nonlinear_viscous_friction: ``C`` of ``C v |v|``.
-        friction_asymmetry: difference of the Coulomb friction between the directions, N m or N.
-        load_dependent_friction: ``beta`` of ``beta |torque| sign(v)``.
-        torque_constant: factor on the measured torque.
-        joint_offset: added to the measured position, rad or m.
-        torque_delay: of the measured torque, s.
-        gravity_direction: rotation of the base about its x and y axes that the model does not know, rad.
-        perturb: random deviation of all bodies and joint terms from the model, up to this fraction.
-        monte_carlo: rehearse so many times and compare predicted with achieved spread.
-        progress: as for :func:`design`.
-    """
-    own, motion = _robot(robot), as_trajectory(trajectory)
-    effects = {
-        "payload": None if payload is None else _numbers("payload", payload),
-        "stribeck_friction": _effect("stribeck_friction", stribeck_friction),
-        "nonlinear_viscous_friction": _effect("nonlinear_viscous_friction", nonlinear_viscous_friction),
-        "friction_asymmetry": _effect("friction_asymmetry", friction_asymmetry),
-        "load_dependent_friction": _effect("load_dependent_friction", load_dependent_friction),
-        "torque_constant": _effect("torque_constant", torque_constant),
-        "joint_offset": _effect("joint_offset", joint_offset),
-        "torque_delay": _real("torque_delay", torque_delay),
-        "gravity_direction": None,
-        "perturb": _real("perturb", perturb),
-    }
-    if gravity_direction is not None:
-        effects["gravity_direction"] = vector("gravity_direction", gravity_direction, 2).tolist()
-    with Bar(progress, "simulate") as bar:
-        raw = _excite.simulate(
-            own._plant,
-            motion.to_json(),
-            periods=_optional("periods", periods),
-            lead_in=_integer("lead_in", lead_in),
-            rate=_real("rate", rate),
-            step=_real("step", step),
-            controller=controller,
-            bandwidth=_real("bandwidth", bandwidth),
-            damping=_real("damping", damping),
-            noise=_real("noise", noise),
-            seed=_integer("seed", seed),
-            effects=effects,
-            pose=bool(pose),
-            monte_carlo_=_optional("monte_carlo", monte_carlo, 1),
-            progress=bar.report,
-        )
-    carried = None if payload is None else "unknown"
-    result = Simulation(raw, own.name, own.joints, bool(derivatives), carried)
     emit(result.warnings)
     return result
 

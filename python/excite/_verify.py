@@ -215,10 +215,7 @@ def _torques(
     joints = said["joints"]
     flat = []
     for model in models:
-        parts = []
-        for r in raw["records"]:
-            q, dq, ddq = (from_columns(r[k], len(joints)) for k in ("q", "dq", "ddq"))
-            parts.append(model.inverse(q, dq, ddq, r["dt"]))
+        parts = model.along(raw["records"], len(joints))
         flat.append(np.ascontiguousarray(np.concatenate(parts).T).reshape(-1))
     energies = _excite.energies(core, flat)
     places = [k for k, r in enumerate(raw["records"]) if any(r is c for c in chosen)]
@@ -329,10 +326,13 @@ def _run(
             raise unusable(f"the simulator must give positions of the shape {log.shape}; its shape is {positions.shape}")
         found.append(positions - log)
     for model in models:
-        before = None
+        before, first = None, start
         if model.remembers and start > 0:
-            before = command(max(start - int(math.ceil(BEFORE / dt)), 0), start, "hold")
-        found.append(model.run(a["q"][start], a["dq"][start], command(start, stop, "gains"), dt, before) - log)
+            first = max(start - int(math.ceil(BEFORE / dt)), 0)
+            before = command(first, start, "hold")
+        lasting = model.lasts(int(r["order"]), a["q"][:first], a["dq"][:first], dt)
+        ran = model.run(a["q"][start], a["dq"][start], command(start, stop, "gains"), dt, before, lasting)
+        found.append(ran - log)
     return _Run(r["name"], start * dt, np.arange(stop - start + 1) * dt, log, found)
 
 

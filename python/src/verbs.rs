@@ -327,6 +327,7 @@ pub fn series<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'
         let d = PyDict::new(py);
         d.set_item("name", r.name)?;
         d.set_item("holdout", !r.fit)?;
+        d.set_item("order", r.order)?;
         d.set_item("dt", r.dt)?;
         d.set_item("referenced", r.reference.is_some())?;
         d.set_item("measured", r.measured)?;

@@ -7,9 +7,10 @@ use super::serial::{Arm, Link};
 use crate::error::{Error, Result};
 use crate::mechanism::Mechanism;
 use crate::plant::Plant;
-use crate::robot::bundled;
+use crate::robot::file::expanded;
 use crate::robot::file::names::did_you_mean;
 use crate::robot::urdf::Urdf;
+use crate::robot::{bundled, xacro};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -40,14 +41,16 @@ fn text(path: &Path) -> Result<String> {
 
 /// Texts of a robot file: `robot.toml` where there is one, and URDF.
 fn texts(spec: &str) -> Result<(Option<String>, String)> {
-    let path = Path::new(spec);
+    let (name, arguments) = xacro::with_arguments(spec);
+    let path = Path::new(name);
     if path.is_file() {
         let own = text(path)?;
         let is_toml = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
         if !is_toml {
-            return Ok((None, own));
+            let (_, urdf) = expanded(path.to_path_buf(), own, &arguments)?;
+            return Ok((None, urdf));
         }
         let table: toml::Table = toml::from_str(&own)
             .map_err(|e| Error::file(path, "", e.message().replace('\n', "; ")))?;
@@ -55,8 +58,10 @@ fn texts(spec: &str) -> Result<(Option<String>, String)> {
             .get("urdf")
             .and_then(toml::Value::as_str)
             .unwrap_or_default();
+        let (urdf, arguments) = xacro::with_arguments(urdf);
         let beside = path.parent().unwrap_or(Path::new("")).join(urdf);
-        return Ok((Some(own), text(&beside)?));
+        let urdf = text(&beside)?;
+        return Ok((Some(own), expanded(beside, urdf, &arguments)?.1));
     }
     match bundled::find(spec) {
         Some(b) => Ok((Some(b.toml.to_string()), b.urdf.to_string())),

@@ -16,7 +16,7 @@ use std::path::{Component, Path, PathBuf};
     after_help = "Examples:\n  excite new arm.urdf > robot.toml\n  excite new description/arm.urdf --output robots/arm.toml\n  excite new hexapod --output machine"
 )]
 pub struct Args {
-    /// URDF file, or one of hexapod, h4, delta
+    /// URDF or xacro file (with its arguments, "arm.urdf.xacro name:=value"), or one of hexapod, h4, delta
     #[arg(value_name = "FILE.urdf|hexapod|h4|delta")]
     urdf: PathBuf,
     /// File to write [default: standard output]; of a parallel robot the folder of robot.toml and experiment.toml [default: .]
@@ -42,14 +42,21 @@ pub fn run(args: Args) -> Result<()> {
         }
         return parallel(kind, &args);
     }
-    if args.urdf.extension().is_none_or(|e| e != "urdf") {
+    let spec = args.urdf.to_string_lossy();
+    // arguments of a xacro stand behind its path
+    let path = spec.split(' ').next().unwrap_or(&spec);
+    let described = [&*spec, path].iter().any(|s| {
+        let extension = Path::new(s).extension();
+        extension.is_some_and(|e| e == "urdf" || e == "xacro")
+    });
+    if !described {
         return Err(Error::Argument(format!(
-            "`{}` is neither a .urdf file, for which `excite new` writes the robot.toml that goes with it, nor one of hexapod, \
+            "`{}` is neither a .urdf nor a .xacro file, for which `excite new` writes the robot.toml that goes with it, nor one of hexapod, \
              h4, delta",
             args.urdf.display()
         )));
     }
-    let mut robot = Robot::load(&args.urdf.to_string_lossy())?;
+    let mut robot = Robot::load(&spec)?;
     robot.geometry.look_in(&args.meshes);
     super::warn(&robot.warnings);
     super::warn(&robot.geometry.volumes().warnings);

@@ -12,7 +12,7 @@
 //! | loads | `payload` | what the robot carried: known, unknown or nothing |
 //! | nominal | `data`, `rigid`, [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
-//! | search | `search`, `verdict` | sets of effects, rivals, confidence |
+//! | search | `search`, `settle`, `verdict` | sets of effects, rivals, confidence |
 //! | constants | [`thresholds`] | what the verdict rests on, with units and origin |
 //! | intervals | `interval` | how sure the share is that an effect explains |
 //! | gap | `gap` | residuals against noise: joints, odd, even, non-periodic |
@@ -56,6 +56,7 @@ mod reversal;
 pub(crate) mod rigid;
 pub(crate) mod search;
 pub(crate) mod settings;
+mod settle;
 #[doc(hidden)]
 pub mod thresholds;
 pub(crate) mod traces;
@@ -75,7 +76,7 @@ pub use traces::Trace;
 pub use verdict::Verdict;
 
 use self::thresholds::THRESHOLDS as T;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{self, Experiment, Purpose};
 use crate::plant::Plant;
 use crate::signals::series::Series;
@@ -179,6 +180,7 @@ pub fn of_logs(
     let cx = Context::new(&data, phi)?;
     progress("every effect at every place");
     let list = search::singles(&evidence, &cx, &effects, &[]);
+    let (cx, list) = settle::settled(&data, &evidence, &effects, cx, list)?;
     let decision = verdict::decide(&evidence, &cx, &effects, &list, progress);
     progress("report");
 
@@ -195,7 +197,30 @@ pub fn of_logs(
     let held = controller::identify(&data, &evidence.phi);
     let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
     let unknowns = &phi_after[..plant.parameters().len()];
-    let (improved, mut warnings) = improve::improve(&evidence, &cx, &effects, unknowns, &findings);
+    let left = |e: &[Vec<f64>]| -> f64 {
+        let held = gap::energies(&data, &result::scaled(&data, e), |r| !r.fit);
+        held.iter().flatten().sum()
+    };
+    let worse = data.predicts() && left(&after) > left(&frozen);
+    let (improved, mut warnings) = match worse {
+        false => improve::improve(&evidence, &cx, &effects, unknowns, &findings),
+        // a file that predicts worse than the model that is there helps nobody
+        true => {
+            let nominal = &evidence.phi[..plant.parameters().len()];
+            improve::improve(&evidence, &cx, &effects, nominal, &[])
+        }
+    };
+    if worse {
+        warnings.push(Warning::new(
+            WarningKind::WorseThanNominal,
+            plant.name(),
+            format!(
+                "with what was fitted {:.2} times the gap of the nominal model is left on holdout records; the robot \
+                 files hold the nominal model",
+                left(&after) / left(&frozen).max(1e-300)
+            ),
+        ));
+    }
     warnings.extend(payload::warnings(logs));
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
     let at_rest = at_rest::find(&data, &units);

@@ -118,6 +118,57 @@ fn impossible(
     })
 }
 
+/// A shape refined with the whole columns, in small steps.
+fn whole(
+    evidence: &Evidence,
+    cx: &Context,
+    effect: &dyn Effect,
+    place: &Place,
+    from: (Tried, Shape),
+    beside: &[&Projected],
+    before: &Fit,
+) -> (Tried, Shape) {
+    let (mut last, mut shape) = from;
+    for step in T.settle.steps {
+        for k in (0..shape.constants.len()).filter(|k| effect.refinable(*k)) {
+            for factor in [step, 1.0 / step] {
+                for _ in 0..T.settle.most {
+                    let mut next = shape.clone();
+                    next.constants[k] *= factor;
+                    match try_shape(evidence, cx, effect, place, &next, beside, before, false) {
+                        Some(t) if t.gain > last.gain * T.shapes.better => {
+                            (last, shape) = (t, next);
+                        }
+                        _ => break,
+                    }
+                }
+            }
+        }
+    }
+    (last, shape)
+}
+
+/// A candidate in another context, its shape refined from where it is.
+pub fn again(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    c: &Candidate,
+) -> Option<Candidate> {
+    let (effect, none) = (effects[c.effect].as_ref(), evidence.fit(&[]));
+    let first = try_shape(evidence, cx, effect, &c.place, &c.shape, &[], &none, false)?;
+    let from = (first, c.shape.clone());
+    let (last, shape) = whole(evidence, cx, effect, &c.place, from, &[], &none);
+    Some(Candidate {
+        shape,
+        projected: last.projected,
+        gain: last.gain,
+        eta: last.eta,
+        ruled_out: last.ruled_out,
+        ..c.clone()
+    })
+}
+
 /// The best shape of an effect at a place, beside a set.
 pub fn best_shape(
     evidence: &Evidence,
@@ -210,6 +261,11 @@ pub fn best_shape(
         }
     }
     let last = try_shape(evidence, cx, effect, place, &shape, beside, before, false)?;
+    // a draft leaves out what gravity and velocity do to a way
+    let (last, shape) = match effect.sways() && last.gain > T.settle.whole {
+        true => whole(evidence, cx, effect, place, (last, shape), beside, before),
+        false => (last, shape),
+    };
     Some(Candidate {
         effect: which,
         place: *place,

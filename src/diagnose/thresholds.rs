@@ -17,7 +17,7 @@ pub use gap::{Forward, Gap, Improved, Measure};
 pub use gate::Gate;
 pub use motions::{Motions, Next};
 pub use records::{Carried, Closeness, Controller, Load, Noise, Prior, Rest, Reversals, Window};
-pub use search::{Search, Shapes};
+pub use search::{Search, Settle, Shapes};
 pub use verdict::{Confidence, Decoys, Entry, Hidden, Interval, Matters, Rivals};
 
 /// All of them.
@@ -53,6 +53,8 @@ pub struct Thresholds {
     pub search: Search,
     /// how shapes are refined
     pub shapes: Shapes,
+    /// how the model settles on an effect that moves the links
+    pub settle: Settle,
     /// how the gap is measured
     pub measure: Measure,
     /// how close an identified model is
@@ -90,6 +92,7 @@ pub const THRESHOLDS: Thresholds = Thresholds {
     rivals: verdict::RIVALS,
     search: search::SEARCH,
     shapes: search::SHAPES,
+    settle: search::SETTLE,
     measure: gap::MEASURE,
     closeness: records::CLOSENESS,
     decoys: verdict::DECOYS,

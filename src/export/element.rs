@@ -129,6 +129,8 @@ pub struct Function {
     pub body: Vec<String>,
     /// memory before the first sample, an expression in the position `q`
     pub start: Option<String>,
+    /// whether the memory goes on from one record to the next
+    pub lasts: bool,
 }
 
 /// A number as Python reads it, in brackets below zero.
@@ -168,17 +170,25 @@ impl Element {
             width,
             body,
             start: None,
+            lasts: false,
         })
     }
 
-    /// Lines that end in `return level, torque, memory`.
-    pub(crate) fn memory(joint: usize, width: f64, start: &str, body: Vec<String>) -> Element {
+    /// Lines that end in `return level, torque, memory`; `lasts` as in [`Function`].
+    pub(crate) fn memory(
+        joint: usize,
+        width: f64,
+        start: &str,
+        lasts: bool,
+        body: Vec<String>,
+    ) -> Element {
         Element::Function(Function {
             kind: Kind::Memory,
             joint,
             width,
             body,
             start: Some(start.into()),
+            lasts,
         })
     }
 
@@ -190,6 +200,7 @@ impl Element {
             width: 1.0,
             body,
             start: None,
+            lasts: false,
         })
     }
 

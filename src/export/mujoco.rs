@@ -279,7 +279,7 @@ impl<'a> Parts<'a> {
                 let _ = writeln!(
                     out,
                     "    <body name=\"{name}\">\n      <inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"{x} {y} {}\"/>",
-                    0.999 * (x + y)
+                    x.max(y)
                 );
                 let names = base_joints(robot);
                 // about y first, then about x

@@ -111,12 +111,15 @@ impl Experiment {
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         let beside = folder.join(&file.robot);
-        let spec = match beside.is_file() {
+        // arguments of a xacro stand behind the path
+        let named = crate::robot::xacro::with_arguments(&file.robot).0;
+        let spec = match folder.join(named).is_file() {
             true => beside.to_string_lossy().into_owned(),
             false
-                if Path::new(&file.robot).components().count() > 1
-                    || file.robot.ends_with(".toml")
-                    || file.robot.ends_with(".urdf") =>
+                if Path::new(named).components().count() > 1
+                    || [".toml", ".urdf", ".xacro"]
+                        .iter()
+                        .any(|e| named.ends_with(e)) =>
             {
                 beside.to_string_lossy().into_owned()
             }

@@ -8,7 +8,7 @@ mod tool;
 
 use super::geometry::{CollisionEntry, Entries, KeepInEntry, ShapeEntry};
 use super::urdf::{Options, Urdf};
-use super::{Prior, Robot, bundled, mjcf};
+use super::{Prior, Robot, bundled, mjcf, xacro};
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -71,8 +71,9 @@ impl Text<'_> {
 }
 
 impl Robot {
-    /// Reads a robot: the path of a `robot.toml`, a `.urdf` or an MJCF, or the name of a bundled robot. A file
-    /// of that name wins over a bundled robot.
+    /// Reads a robot: the path of a `robot.toml`, a `.urdf`, a `.xacro` or an MJCF, or the name of a bundled robot. A
+    /// file of that name wins over a bundled robot. Arguments of a xacro stand behind its path, as in
+    /// `ur.urdf.xacro ur_type:=ur5e`.
     ///
     /// # Errors
     /// Nothing of that name, or whatever [`Robot::from_toml_str`] and [`Robot::from_urdf_str`]
@@ -84,10 +85,11 @@ impl Robot {
                 all_bundled().collect::<Vec<_>>().join(", ")
             )));
         }
-        let path = Path::new(spec);
+        let (name, arguments) = xacro::with_arguments(spec);
+        let path = Path::new(name);
         let directory = path.is_dir();
         if path.exists() && !directory {
-            return load_path(path);
+            return load_path(path, &arguments);
         }
         if let Some(robot) = bundled::find(spec) {
             return robot.load();
@@ -172,7 +174,7 @@ fn all_bundled() -> impl Iterator<Item = &'static str> {
     bundled::names().into_iter().chain(bundled::PARALLEL)
 }
 
-fn load_path(path: &Path) -> Result<Robot> {
+fn load_path(path: &Path, arguments: &BTreeMap<String, String>) -> Result<Robot> {
     let text = read_text(path)?;
     let source = Text {
         file: path,
@@ -180,7 +182,13 @@ fn load_path(path: &Path) -> Result<Robot> {
     };
     let is_toml = match path.extension().and_then(|e| e.to_str()) {
         Some(e) if e.eq_ignore_ascii_case("toml") => true,
-        Some(e) if e.eq_ignore_ascii_case("urdf") || e.eq_ignore_ascii_case("xml") => false,
+        Some(e)
+            if ["urdf", "xml", "xacro"]
+                .iter()
+                .any(|x| e.eq_ignore_ascii_case(x)) =>
+        {
+            false
+        }
         // a pipe or an unusual extension: XML begins with <
         _ if text
             .trim_start_matches('\u{feff}')
@@ -206,7 +214,15 @@ fn load_path(path: &Path) -> Result<Robot> {
                 "it names no URDF; add urdf = \"robot.urdf\"",
             ));
         };
-        let urdf_path = path.parent().unwrap_or(Path::new("")).join(urdf.get_ref());
+        if !arguments.is_empty() {
+            return Err(Error::file(
+                path,
+                "",
+                "arguments of a xacro stand in it, behind the name: urdf = \"robot.urdf.xacro name:=value\"",
+            ));
+        }
+        let (urdf_name, arguments) = xacro::with_arguments(urdf.get_ref());
+        let urdf_path = path.parent().unwrap_or(Path::new("")).join(urdf_name);
         if urdf_path.is_dir() {
             return Err(source.error(
                 urdf.span().start,
@@ -228,6 +244,7 @@ fn load_path(path: &Path) -> Result<Robot> {
             ),
             other => other,
         })?;
+        let (urdf_path, urdf_text) = expanded(urdf_path, urdf_text, &arguments)?;
         apply(
             source,
             &file,
@@ -237,10 +254,38 @@ fn load_path(path: &Path) -> Result<Robot> {
             },
         )?
     } else {
-        from_urdf(source)?
+        let (file, text) = expanded(path.to_path_buf(), text.clone(), arguments)?;
+        from_urdf(Text {
+            file: &file,
+            text: &text,
+        })?
     };
     robot.path = Some(path.to_path_buf());
     Ok(robot)
+}
+
+/// A description with the xacro in it expanded; its name says so then, for lines are those of the URDF.
+///
+/// # Errors
+/// Whatever [`xacro::expand`] finds wrong; arguments for a file that takes none.
+pub(crate) fn expanded(
+    path: PathBuf,
+    text: String,
+    arguments: &BTreeMap<String, String>,
+) -> Result<(PathBuf, String)> {
+    if xacro::is(&text) {
+        let text = xacro::expand(&text, &path, arguments)?;
+        let mut name = path.into_os_string();
+        name.push(" (expanded)");
+        return Ok((name.into(), text));
+    }
+    match arguments.keys().next() {
+        Some(name) => Err(Error::Argument(format!(
+            "{} takes no argument `{name}`: there is no xacro in it",
+            path.display()
+        ))),
+        None => Ok((path, text)),
+    }
 }
 
 /// Links and joints of a URDF, or of an MJCF, told apart by the root element; `file` is what errors call it.

@@ -19,6 +19,7 @@ mod stribeck;
 pub(crate) mod tool;
 pub(crate) mod urdf;
 mod velocity_by_position;
+pub(crate) mod xacro;
 
 pub use inertia::Inertia;
 #[doc(hidden)]

@@ -135,3 +135,8 @@ fn every_effect_in_mujoco_springs_and_encoders() {
         "encoder_eccentricity",
     ]);
 }
+
+#[test]
+fn every_effect_in_mujoco_swinging() {
+    left_in_mujoco(&["backlash", "base_compliance"]);
+}

@@ -440,7 +440,7 @@ fn singular_layouts_are_said() {
 #[test]
 fn a_tree_is_asked_for_where_only_a_tree_will_do() {
     for (command, words) in [
-        ("new scara", "neither a .urdf file"),
+        ("new scara", "neither a .urdf nor a .xacro file"),
         ("torque hexapot none.csv", "did you mean `hexapod`"),
     ] {
         let out = Command::cargo_bin("excite")

@@ -92,7 +92,7 @@ fn urdf_errors_say_where_and_what_to_do() {
         ),
         (
             replaced("<link name=\"base\"/>", "<xacro:macro name=\"m\"/>"),
-            &["xacro", "run"],
+            &["xacro", "xmlns"],
         ),
         (
             replaced(

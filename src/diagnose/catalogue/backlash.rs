@@ -45,8 +45,12 @@ impl Effect for Backlash {
         all
     }
 
-    fn refinable(&self, k: usize) -> bool {
-        k < 2
+    fn refinable(&self, _k: usize) -> bool {
+        true
+    }
+
+    fn sways(&self) -> bool {
+        true
     }
 
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
@@ -63,16 +67,19 @@ impl Effect for Backlash {
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
         let j = place.first();
-        let mut all = Vec::with_capacity(cx.data.rows());
-        for (k, r) in cx.data.records.iter().enumerate() {
+        let spring = |r: &Series, k: usize| {
             let span = cx.data.span(k);
-            let load = &cx.rigid[j][span.clone()];
-            let mass = &cx.mass[j][j][span];
-            let [_, _, a] =
-                spring::way(load, mass, r.dt, shape[0], shape[1], shape[2], 0.0, r.cycle);
-            all.extend(a);
+            let (load, mass) = (&cx.rigid[j][span.clone()], &cx.mass[j][j][span]);
+            spring::way(load, mass, r.dt, shape[0], shape[1], shape[2], 0.0, r.cycle)
+        };
+        if draft {
+            let mut all = Vec::with_capacity(cx.data.rows());
+            for (k, r) in cx.data.records.iter().enumerate() {
+                all.extend_from_slice(&spring(r, k)[2]);
+            }
+            return vec![cx.inertial(j, &all, true)];
         }
-        vec![cx.inertial(j, &all, draft)]
+        vec![cx.displaced(j, spring)]
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {

@@ -27,16 +27,24 @@ impl Effect for BaseCompliance {
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
         // natural frequency of the robot on its base, damping ratio
-        [4.0, 6.0, 9.0, 13.0, 20.0, 40.0]
-            .map(|f| Shape::of(&[f, 0.05]))
-            .to_vec()
+        let mut all = Vec::new();
+        for frequency in [4.0, 6.0, 9.0, 13.0, 20.0, 40.0] {
+            for damping in [0.05, 0.15] {
+                all.push(Shape::of(&[frequency, damping]));
+            }
+        }
+        all
     }
 
-    fn refinable(&self, k: usize) -> bool {
-        k == 0
+    fn refinable(&self, _k: usize) -> bool {
+        true
     }
 
     fn rings(&self, _shape: &Shape) -> bool {
+        true
+    }
+
+    fn sways(&self) -> bool {
         true
     }
 

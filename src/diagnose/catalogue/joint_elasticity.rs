@@ -45,6 +45,10 @@ impl Effect for JointElasticity {
         shape[1] > 0.08
     }
 
+    fn sways(&self) -> bool {
+        true
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let joint = e.place.first();
         let [stiffness, damping, twist] = spring::constants(cx, joint, e.shape[0], e.shape[1]);

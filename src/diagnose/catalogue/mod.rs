@@ -103,6 +103,10 @@ pub trait Effect: Sync {
     fn hides(&self) -> bool {
         false
     }
+    /// Whether it moves links against what the encoders read, by a way that the inertia of the model decides.
+    fn sways(&self) -> bool {
+        false
+    }
     /// Whether it rings with damping, as the loop of the robot's controller does.
     fn rings(&self, _shape: &Shape) -> bool {
         false

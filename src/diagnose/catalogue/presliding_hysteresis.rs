@@ -67,7 +67,13 @@ impl Effect for PreslidingHysteresis {
         lines.insert(0, "d = q - memory[0]".into());
         // what builds up takes the place of what turns at once
         lines.push(format!("return -{level}, {level} * z, memory"));
-        Some(Element::memory(j, 1e-3 * cx.data.speed[j], &start, lines))
+        Some(Element::memory(
+            j,
+            1e-3 * cx.data.speed[j],
+            &start,
+            false,
+            lines,
+        ))
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {

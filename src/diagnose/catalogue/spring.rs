@@ -3,6 +3,9 @@
 use super::Context;
 use crate::diagnose::window::{FINE, from_fine};
 
+/// How much of the begin of a record without periods is run through first, s.
+const BACK: f64 = 2.0;
+
 /// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J`, where `T`
 /// is the torque of flanks at `±b/2` with springs of `M (2πf)²` and a damping ratio; the springs
 /// stiffen by `cubic` at the largest load. Averaged as torque is measured.
@@ -26,9 +29,28 @@ pub(crate) fn way(
     let k = mean * omega * omega;
     let d = 2.0 * damping * mean * omega;
     let twist = load.iter().fold(1e-12f64, |m, v| m.max(v.abs())) / k;
-    let (mut x, mut v) = (-gap / 2.0 * load[0].signum() - load[0] / k, 0.0);
+    let begin = match cycle {
+        Some(_) => load[0],
+        None => load[((BACK / dt) as usize).min(n - 1)],
+    };
+    let (mut x, mut v) = (-gap / 2.0 * begin.signum() - begin / k, 0.0);
     let mut values: [Vec<f64>; 3] = Default::default();
     let settle = cycle.unwrap_or(0).min(n - 1);
+    if cycle.is_none() {
+        // a record may begin in the middle of a motion: backwards through its begin with a damping of one half, so that
+        // nothing swings from the start
+        let back = ((BACK / dt) as usize).min(n - 1);
+        for i in (0..back).rev() {
+            let (m, steps) = (mass[i].max(0.05 * mean), FINE * sub);
+            for s in 0..steps {
+                let tau = load[i + 1] + s as f64 / steps as f64 * (load[i] - load[i + 1]);
+                let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
+                v += h * (-k * beyond - mean * omega * v - tau) / m;
+                x += h * v;
+            }
+        }
+        v = -v;
+    }
     for pass in 0..2 {
         let upto = if pass == 0 { settle } else { n };
         for i in 0..upto {

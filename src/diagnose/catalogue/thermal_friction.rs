@@ -69,6 +69,7 @@ impl Effect for ThermalFriction {
             j,
             T.reversals.sharp * top,
             "0.0 * q",
+            e.shape.form == LASTS,
             lines,
         ))
     }

@@ -70,3 +70,36 @@ pub(super) const SHAPES: Shapes = Shapes {
     above: 1.2,
     better: 1.0005,
 };
+
+/// How the model settles on an effect that moves the links.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Settle {
+    /// Gain over that of the best effect, from which on the model is fitted beside an effect that moves the links. Unit: share.
+    /// Source: by hand.
+    pub near: f64,
+    /// How many of those. Unit: count. Source: by hand.
+    pub tried: usize,
+    /// Rounds of each. Unit: count. Source: by hand.
+    pub rounds: usize,
+    /// Change of the gain from round to round below which it has settled. Unit: share. Source: by hand.
+    pub still: f64,
+    /// Gain that must be left of that of the best effect when it has. Unit: share. Source: by hand.
+    pub least: f64,
+    /// Gain from which on the shape is refined with the whole column. Unit: noise variances. Source: by hand.
+    pub whole: f64,
+    /// Factors of the steps of that. Unit: ratio. Source: by hand.
+    pub steps: [f64; 2],
+    /// Steps in one direction. Unit: count. Source: by hand.
+    pub most: usize,
+}
+
+pub(super) const SETTLE: Settle = Settle {
+    near: 0.4,
+    tried: 3,
+    rounds: 12,
+    still: 0.0005,
+    least: 0.8,
+    whole: 500.0,
+    steps: [1.05, 1.02],
+    most: 6,
+};

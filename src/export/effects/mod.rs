@@ -60,6 +60,7 @@ impl Format for Effects {
 struct Tables {
     added: Vec<String>,
     remembered: Vec<String>,
+    lasting: Vec<String>,
     displaced: Vec<String>,
     drives: Vec<String>,
     delayed: Vec<String>,
@@ -128,6 +129,11 @@ fn text(model: &Model) -> String {
             &tables.remembered,
         ),
         (
+            "keys of memories that go on from one record to the next",
+            "LASTING",
+            &tables.lasting,
+        ),
+        (
             "joint, way of the joint beyond what its encoder reads",
             "DISPLACED",
             &tables.displaced,
@@ -190,6 +196,7 @@ fn add(
             width,
             body: lines,
             start,
+            lasts,
         }) => {
             let arguments = match kind {
                 Kind::Torque => "q, dq, load, xp=np",
@@ -199,6 +206,9 @@ fn add(
             };
             *functions += &head(arguments);
             *functions += &body(lines);
+            if *lasts {
+                tables.lasting.push(format!("\"{name}\""));
+            }
             match kind {
                 Kind::Torque => tables.added.push(format!("({joint}, {name})")),
                 Kind::Memory => tables.remembered.push(format!(

@@ -112,7 +112,9 @@ class Installed:
                         # the copy that the solver of mj_step reads
                         data.iefc_frictionloss[data.map_efc2iefc[row]] = max(level, 0.0)
                     level = min(level, 0.0)
-                force += level * float(np.tanh(dq[j] / WIDTH[j]))
+                # along a motion the sign of the velocity is known
+                known = self.loss[j] > 0.0
+                force += level * float(np.sign(dq[j]) if known else np.tanh(dq[j] / WIDTH[j]))
             data.qfrc_passive[dof] -= force
         for (_, f), at, dof in zip(FREE, self.free_at, self.free_dof):
             if f is not None:
@@ -137,7 +139,7 @@ def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
 
     model: robot.xml as MuJoCo loads it; q, dq, ddq: what the encoders read (samples, joints), with its derivatives;
     dt: time between samples, s; memory: from `start`, or a dict that carries it from run to run (it is changed; empty
-    before the first). Joints that no drive moves are integrated on their springs.
+    before the first; what is in `LASTING` belongs there, the rest begins anew with every run). Joints that no drive moves are integrated on their springs.
     """
     import mujoco
 

@@ -70,6 +70,14 @@ pub fn into_scene(model: &Model, scene: &Path, folder: &Path) -> Result<Edited> 
         )));
     }
     let text = read_text(scene)?;
+    if crate::robot::xacro::is(&text) {
+        return Err(Error::file(
+            scene,
+            "",
+            "a xacro is not written back, for its values come from macros and other files; take the robot.urdf that is \
+             written anyway",
+        ));
+    }
     let mut edited = match format::is(&text) {
         true => mjcf::write(model, scene, &text, folder)?,
         false => urdf::write(model, scene, &text, folder)?,

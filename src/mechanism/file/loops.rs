@@ -12,7 +12,8 @@ use crate::mechanism::loops::Loops;
 use crate::mechanism::loops::yaml;
 use crate::robot::file::names::{did_you_mean, listed};
 use crate::robot::file::text::read_text;
-use crate::robot::file::{Text, described};
+use crate::robot::file::{Text, described, expanded};
+use crate::robot::xacro;
 use closure::{LoopEntry, Names, closure, from_yaml};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -56,7 +57,10 @@ pub(super) fn read(source: Text, folder: &Path) -> Result<Mechanism> {
             Err(other) => Err(other),
         }
     };
-    let (urdf_path, urdf_text) = beside(&file.urdf, "urdf")?;
+    let (name, arguments) = xacro::with_arguments(file.urdf.get_ref());
+    let named = Spanned::new(file.urdf.span(), name.to_string());
+    let (urdf_path, urdf_text) = beside(&named, "urdf")?;
+    let (urdf_path, urdf_text) = expanded(urdf_path, urdf_text, &arguments)?;
     let mut hash = Sha256::new()
         .chain_update(source.text)
         .chain_update(&urdf_text);

@@ -302,7 +302,9 @@ fn xml_error(text: &str, file: &Path, error: &roxmltree::Error) -> Error {
     use roxmltree::Error as Xml;
     let message = match error {
         Xml::UnknownNamespace(prefix, _) if prefix == "xacro" => {
-            "this is a xacro file; run `xacro file.xacro > file.urdf` first".to_string()
+            "it uses xacro, and <robot> does not declare it; add \
+             xmlns:xacro=\"http://www.ros.org/wiki/xacro\""
+                .to_string()
         }
         _ if !text.trim_start().starts_with('<') => {
             "this is not XML; a URDF begins with <robot name=…>".to_string()
@@ -337,7 +339,7 @@ fn xacro(source: &Source, root: Node) -> Result<()> {
         Some(node) => Err(source.error(
             node,
             &format!("<{}>", node.tag_name().name()),
-            "this is a xacro file; run `xacro file.xacro > file.urdf` first",
+            "this is the text of a xacro file; name the file itself, which is expanded as it is read",
         )),
         None => Ok(()),
     }

@@ -1,0 +1,163 @@
+//! Elements of xacro.
+
+use super::scope::Entry;
+use super::tree::{self, Element, Node};
+use super::value::Value;
+use super::{Work, Wrong};
+
+impl Work {
+    /// An element of xacro, expanded.
+    pub(super) fn directive(&mut self, e: &Element) -> Result<Vec<Node>, Wrong> {
+        match e.name.as_str() {
+            "arg" => self.argument(e).map(|()| Vec::new()),
+            "property" => self.define(e).map(|()| Vec::new()),
+            "macro" => self.learn(e).map(|()| Vec::new()),
+            "include" => self.include(e),
+            "if" | "unless" => {
+                let text = wanted(e, "value")?;
+                let value = self.text(text)?;
+                let holds = value.condition().ok_or_else(|| {
+                    format!(
+                        "`{text}` is `{value}` in xacro:{}, and no truth value",
+                        e.name
+                    )
+                })?;
+                match holds == (e.name == "if") {
+                    true => self.nodes(&e.children),
+                    false => Ok(Vec::new()),
+                }
+            }
+            "insert_block" => {
+                let name = self.text(wanted(e, "name")?)?.to_string();
+                let scope = self.scopes.depth() - 1;
+                let block = ["**", "*"].iter().find_map(|stars| {
+                    match self.scopes.find(&format!("{stars}{name}"), scope) {
+                        Some((_, Entry::Block(nodes))) => Some(nodes.clone()),
+                        _ => None,
+                    }
+                });
+                self.nodes(&block.ok_or_else(|| format!("there is no block `{name}`"))?)
+            }
+            "call" => {
+                let name = self.text(wanted(e, "macro")?)?.to_string();
+                let mut call = e.clone();
+                call.attributes.retain(|(n, _)| n != "macro");
+                self.call(&name, &call)
+            }
+            "element" | "attribute" => Err(format!(
+                "xacro:{} is not read; write the element as it is meant",
+                e.name
+            )),
+            name => self.call(name, e),
+        }
+    }
+
+    /// `xacro:arg`: a default of an argument.
+    pub(super) fn argument(&mut self, e: &Element) -> Result<(), Wrong> {
+        let name = wanted(e, "name")?.to_string();
+        self.asked.insert(name.clone());
+        if let Some(default) = e.attribute("default")
+            && !self.arguments.contains_key(&name)
+        {
+            let value = self.text(default)?.to_string();
+            self.arguments.insert(name, value);
+        }
+        Ok(())
+    }
+
+    /// `xacro:property`.
+    fn define(&mut self, e: &Element) -> Result<(), Wrong> {
+        let name = self.text(wanted(e, "name")?)?.to_string();
+        let here = self.scopes.depth() - 1;
+        let truth = |text: Option<&str>| text.and_then(|t| Value::literal(t).condition());
+        let stated = e.attribute("scope");
+        let scope = match stated {
+            Some("global") => 0,
+            Some("parent") => here.saturating_sub(1),
+            Some(other) => {
+                return Err(format!(
+                    "a property has no scope `{other}`; use parent or global"
+                ));
+            }
+            None => here,
+        };
+        if truth(e.attribute("remove")) == Some(true) {
+            self.scopes.remove(scope, &name);
+            return Ok(());
+        }
+        let value = match (e.attribute("default"), e.attribute("value")) {
+            (Some(_), None) if self.scopes.find(&name, here).is_some() => return Ok(()),
+            (_, Some(text)) | (Some(text), None) => text,
+            (None, None) => {
+                let block = Entry::Block(e.children.clone());
+                self.scopes.set(scope, &format!("**{name}"), block);
+                return Ok(());
+            }
+        };
+        let later = stated.is_none() && truth(e.attribute("lazy_eval")) != Some(false);
+        let entry = match Value::literal(value) {
+            Value::Text(_) if later && value.contains('$') => Entry::Later(value.into()),
+            Value::Text(_) => match self.text(value)? {
+                Value::Text(t) => Entry::Value(Value::literal(&t)),
+                other => Entry::Value(other),
+            },
+            literal => Entry::Value(literal),
+        };
+        // a property that is stated anew by itself has its old value in it
+        if let Entry::Later(text) = &entry
+            && self
+                .scopes
+                .find(&name, here)
+                .is_some_and(|(at, _)| at == scope)
+            && mentions(text, &name)
+        {
+            return Err(format!("the property `{name}` needs itself"));
+        }
+        self.scopes.set(scope, &name, entry);
+        Ok(())
+    }
+
+    /// `xacro:include`: the children of the root of another file.
+    fn include(&mut self, e: &Element) -> Result<Vec<Node>, Wrong> {
+        if e.attribute("ns").is_some() {
+            return Err(
+                "a name space of an included file (ns) is not read; include it without".into(),
+            );
+        }
+        let name = self.text(wanted(e, "filename")?)?.to_string();
+        let optional = e
+            .attribute("optional")
+            .and_then(|t| Value::literal(t).condition())
+            == Some(true);
+        let (path, text) = match self.open(&name) {
+            Err(_) if optional => return Ok(Vec::new()),
+            other => other?,
+        };
+        let line = self.line;
+        self.files.push(path);
+        self.line = 1;
+        let root = tree::read(&text)?;
+        let out = self.nodes(&root.children)?;
+        self.files.pop();
+        self.line = line;
+        Ok(out)
+    }
+}
+
+/// Whether the expressions of a text have a name in them.
+fn mentions(text: &str, name: &str) -> bool {
+    let inside = text
+        .split("${")
+        .skip(1)
+        .filter_map(|part| part.split('}').next());
+    let letter = |c: char| c.is_alphanumeric() || c == '_';
+    inside
+        .flat_map(|part| part.split(|c: char| !letter(c)))
+        .any(|word| word == name)
+}
+
+/// An attribute that must be there.
+pub(super) fn wanted<'a>(e: &'a Element, name: &str) -> Result<&'a str, Wrong> {
+    e.attribute(name)
+        .ok_or_else(|| format!("xacro:{} has no `{name}`", e.name))
+}

@@ -1,0 +1,226 @@
+//! Descriptions, with what Python and its own xacro make of them; and what is refused.
+
+use super::*;
+use crate::robot::Robot;
+
+fn expanded(text: &str) -> Result<String> {
+    expand(text, Path::new("arm.xacro"), &BTreeMap::new())
+}
+
+fn body(inside: &str) -> String {
+    let text =
+        format!("<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" name=\"r\">{inside}</robot>");
+    let out = expanded(&text).unwrap_or_else(|e| panic!("{inside}: {e}"));
+    let out = out.split_once("<robot name=\"r\"").unwrap().1;
+    let lines: Vec<&str> = out.lines().map(str::trim).collect();
+    lines
+        .concat()
+        .trim_start_matches('>')
+        .replace("</robot>", "")
+}
+
+fn value(expression: &str) -> String {
+    let out = body(&format!("<a b=\"${{{expression}}}\"/>"));
+    out.strip_prefix("<a b=\"")
+        .unwrap()
+        .strip_suffix("\"/>")
+        .unwrap()
+        .into()
+}
+
+fn refused(inside: &str) -> String {
+    let text = format!("<robot xmlns:xacro=\"http://ros.org/xacro\" name=\"r\">\n{inside}</robot>");
+    expanded(&text).unwrap_err().to_string()
+}
+
+#[test]
+fn expressions_are_those_of_python() {
+    for (text, wanted) in [
+        ("2*3 + 1", "7"),
+        ("7/2", "3.5"),
+        ("-7//2", "-4"),
+        ("-7 % 3", "2"),
+        ("-2**2", "-4"),
+        ("2**-1", "0.5"),
+        ("2**3**2", "512"),
+        ("1./12 * 3 * (3*0.1**2 + 0.2**2)", "0.0175"),
+        ("'a' if 2 &gt; 1 else 'b'", "a"),
+        ("'' if False else 'x' + '_'", "x_"),
+        ("'y' in 'xyz' and not 'q' in 'xyz'", "True"),
+        ("1 &lt; 2 &lt;= 2", "True"),
+        ("'0 0 1.5'.split(' ')[2]", "1.5"),
+        ("[1, 2, 3][-1]", "3"),
+        ("[1, 2, 3][1:]", "[2, 3]"),
+        ("len('abc') + max(1, 5, 3)", "8"),
+        ("radians(180) == pi", "True"),
+        ("round(2.5) + int(3.9)", "5"),
+        ("str(1) + 'x'", "1x"),
+        ("math.sqrt(16)", "4.0"),
+        ("None == 0 or 3", "3"),
+    ] {
+        assert_eq!(value(text), wanted, "{text}");
+    }
+}
+
+#[test]
+fn properties_macros_and_conditions() {
+    // later properties, in any order
+    assert_eq!(
+        body(
+            "<xacro:property name=\"a\" value=\"${b*2}\"/><xacro:property name=\"b\" value=\"3\"/><x v=\"${a}\"/>"
+        ),
+        "<x v=\"6\"/>"
+    );
+    // text stays text, numbers are numbers
+    assert_eq!(
+        body("<xacro:property name=\"a\" value=\"0.5\"/><x v=\"${a+1} $${a} ${'0.5'}\"/>"),
+        "<x v=\"1.5 ${a} 0.5\"/>"
+    );
+    // parameters: given, by default, forwarded, blocks
+    let text = "<xacro:property name=\"f\" value=\"2\"/><xacro:macro name=\"m\" params=\"a b:=7 f:=^ g:=^|'x y' *one **all\">\
+                <x a=\"${a}\" b=\"${b}\" f=\"${f}\" g=\"${g}\"/><xacro:insert_block name=\"one\"/><xacro:insert_block name=\"all\"/>\
+                </xacro:macro><xacro:m a=\"1\"><p/><q><r/><s/></q></xacro:m>";
+    assert_eq!(
+        body(text),
+        "<x a=\"1\" b=\"7\" f=\"2\" g=\"x y\"/><p/><r/><s/>"
+    );
+    // a macro sets a property of its caller
+    let text = "<xacro:macro name=\"m\"><xacro:property name=\"a\" value=\"9\" scope=\"parent\"/></xacro:macro><xacro:m/><x a=\"${a}\"/>";
+    assert_eq!(body(text), "<x a=\"9\"/>");
+    assert_eq!(
+        body(
+            "<xacro:if value=\"${1 == 1}\"><y/></xacro:if><xacro:unless value=\"true\"><z/></xacro:unless>"
+        ),
+        "<y/>"
+    );
+    // arguments may stand below the line that needs them
+    assert_eq!(
+        body("<x a=\"$(arg n)\"/><xacro:arg name=\"n\" default=\"5\"/>"),
+        "<x a=\"5\"/>"
+    );
+}
+
+#[test]
+fn what_cannot_be_expanded_is_said_with_line_and_name() {
+    for (inside, wanted) in [
+        ("<x a=\"${b}\"/>", "`b` is not defined"),
+        ("<x a=\"$(arg b)\"/>", "the argument `b` has no value"),
+        (
+            "<x a=\"$(find no_such_package_here)\"/>",
+            "no package `no_such_package_here`",
+        ),
+        ("<xacro:nothing/>", "no macro `nothing`"),
+        (
+            "<xacro:property name=\"a\" value=\"${a}\"/><x b=\"${a}\"/>",
+            "needs itself",
+        ),
+        (
+            "<xacro:property name=\"a\" value=\"${b}\"/><xacro:property name=\"b\" value=\"${a}\"/><x b=\"${a}\"/>",
+            "needs itself",
+        ),
+        (
+            "<xacro:macro name=\"m\"><xacro:m/></xacro:macro><xacro:m/>",
+            "without end",
+        ),
+        (
+            "<xacro:macro name=\"m\" params=\"a\"/><xacro:m/>",
+            "needs the parameter `a`",
+        ),
+        (
+            "<xacro:macro name=\"m\"/><xacro:m b=\"1\"/>",
+            "no parameter `b`",
+        ),
+        ("<xacro:if value=\"maybe\"/>", "no truth value"),
+        ("<x a=\"${1/0}\"/>", "division by zero"),
+        ("<x a=\"${[x for x in y]}\"/>", "for"),
+        ("<x a=\"${'a' * 10**9}\"/>", "too long"),
+        ("<xacro:element xacro:name=\"a\"/>", "not read"),
+        (
+            "<xacro:include filename=\"not_there.xacro\"/>",
+            "not_there.xacro",
+        ),
+    ] {
+        let said = refused(inside);
+        assert!(
+            said.contains(wanted) && said.contains("line 2"),
+            "{inside}: {said}"
+        );
+    }
+}
+
+#[test]
+fn deep_nesting_is_refused_and_not_overrun() {
+    let text = format!("<x a=\"${{{}1{}}}\"/>", "(".repeat(400), ")".repeat(400));
+    assert!(refused(&text).contains("deeply"));
+    let text = format!("{}{}", "<x>".repeat(5000), "</x>".repeat(5000));
+    assert!(refused(&text).contains("deeply") || refused(&text).contains("nest"));
+    let text = format!("<x a=\"${{{}1}}\"/>", "not ".repeat(100_000));
+    assert!(refused(&text).contains("more than"));
+}
+
+const ARM: &str = r#"<?xml version="1.0"?>
+<robot xmlns:xacro="http://wiki.ros.org/xacro" name="$(arg name)">
+  <xacro:arg name="name" default="arm"/>
+  <xacro:arg name="kind" default=""/>
+  <xacro:include filename="$(find demo_description)/urdf/macros.xacro"/>
+  <xacro:limits file="$(find demo_description)/config/$(arg kind)/limits.yaml"/>
+  <link name="base"/>
+  <xacro:cylinder name="link" mass="1.5" radius="0.1" length="0.2"><origin xyz="0 0 ${0.2/2}"/></xacro:cylinder>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="link"/><axis xyz="0 0 1"/>
+    <limit lower="${low}" upper="${high}" velocity="${limits.velocity}" effort="${limits['effort']}"/></joint>
+</robot>
+"#;
+const MACROS: &str = r#"<robot xmlns:xacro="http://wiki.ros.org/xacro">
+  <xacro:macro name="limits" params="file">
+    <xacro:property name="config" value="${xacro.load_yaml(file)}"/>
+    <xacro:property name="limits" value="${config['joint_limits']['turn']}" scope="parent"/>
+    <xacro:property name="low" value="${config['joint_limits']['turn']['low']}" scope="parent"/>
+    <xacro:property name="high" value="${config['joint_limits']['turn']['high']}" scope="parent"/>
+  </xacro:macro>
+  <xacro:macro name="cylinder" params="name mass radius length *origin">
+    <link name="${name}"><inertial><mass value="${mass}"/><xacro:insert_block name="origin"/>
+      <inertia ixx="${1./12 * mass * (3 * radius**2 + length**2)}" iyy="${1./12 * mass * (3 * radius**2 + length**2)}"
+        izz="${mass * radius * radius / 2}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  </xacro:macro>
+</robot>
+"#;
+const LIMITS: &str = "joint_limits:\n  turn: {low: !degrees -90.0, high: !degrees 180.0, velocity: 2.5, effort: 1.2e2}\n";
+
+#[test]
+fn a_description_of_several_files_is_a_robot() {
+    let folder = tempfile::tempdir().unwrap();
+    let package = folder.path().join("demo_description");
+    for (name, text) in [
+        (
+            "package.xml",
+            "<package><name>demo_description</name></package>",
+        ),
+        ("urdf/arm.urdf.xacro", ARM),
+        ("urdf/macros.xacro", MACROS),
+        ("config/small/limits.yaml", LIMITS),
+        ("robot.toml", "urdf = \"urdf/arm.urdf.xacro kind:=small\"\n"),
+    ] {
+        let path = package.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+    let file = package.join("urdf/arm.urdf.xacro");
+    let file = file.to_str().unwrap();
+    let robot = Robot::load(&format!("{file} kind:=small name:=one")).unwrap();
+    assert_eq!(robot.name, "one");
+    assert_eq!(robot.bodies[0].inertia.mass(), 1.5);
+    let [low, high] = robot.joints[0].limits.position;
+    assert!((low + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    assert!((high - std::f64::consts::PI).abs() < 1e-12);
+    assert_eq!(robot.joints[0].limits.effort, 120.0);
+    let other = Robot::load(package.join("robot.toml").to_str().unwrap()).unwrap();
+    assert_eq!(other.joints[0].limits.velocity, 2.5);
+    let said = Robot::load(&format!("{file} kinds:=small"))
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("limits.yaml"), "{said}");
+    let said = Robot::load(&format!("{file} kind:=small nam:=x"))
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains("did you mean `name`"), "{said}");
+}
