@@ -274,13 +274,9 @@ impl<'a> Parts<'a> {
                 damping,
                 inertia,
             }) => {
-                let [x, y] = inertia.map(|i| i.max(1e-6));
                 let name = free_name(robot, "base_tilt".into());
-                let _ = writeln!(
-                    out,
-                    "    <body name=\"{name}\">\n      <inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"{x} {y} {}\"/>",
-                    x.max(y)
-                );
+                let stand = body::tilting(inertia);
+                let _ = writeln!(out, "    <body name=\"{name}\">\n      {stand}");
                 let names = base_joints(robot);
                 // about y first, then about x
                 for (axis, direction) in [(1, "0 1 0"), (0, "1 0 0")] {

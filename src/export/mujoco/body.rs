@@ -14,6 +14,16 @@ pub(in crate::export) fn placement(position: &Vector3<f64>, q: &UnitQuaternion<f
     )
 }
 
+/// The element `inertial` of the massless body between the ground and a base that tilts about x and y. Its moment about z
+/// is felt by no small tilt: the larger of both, with which the body can exist.
+pub(in crate::export) fn tilting(inertia: &[f64; 2]) -> String {
+    let [x, y] = inertia.map(|i| i.max(1e-6));
+    format!(
+        "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"{x} {y} {}\"/>",
+        x.max(y)
+    )
+}
+
 /// The element `inertial` of a body; at its frame's origin where it has no mass.
 pub(in crate::export) fn inertial(body: &Inertia) -> String {
     let (c, i) = (body.com().unwrap_or_default(), body.tensor_com());

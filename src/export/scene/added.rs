@@ -6,7 +6,7 @@ use super::text::Edits;
 use crate::error::Result;
 use crate::export::Element;
 use crate::export::escape;
-use crate::export::mujoco::body::{inertial, placement};
+use crate::export::mujoco::body::{inertial, placement, tilting};
 use crate::export::mujoco::{Parts, free_name, stiff};
 use crate::robot::mjcf::xml::Node;
 use crate::robot::{Inertia, Motion, Robot};
@@ -153,16 +153,12 @@ impl Work<'_> {
         let outer = world * turned.inverse() * own.inverse();
         let wrapper = outer.inverse() * self.matched.base;
         let inner = wrapper.inverse();
-        let [x, y] = inertia.map(|i| i.max(1e-6));
         let mut lines = vec![format!(
             "<body name=\"{}\"{}>",
             free_name(&robot, "base_tilt".into()),
             placed(&wrapper)
         )];
-        lines.push(format!(
-            "  <inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"{x} {y} {}\"/>",
-            0.999 * (x + y)
-        ));
+        lines.push(format!("  {}", tilting(inertia)));
         let names = crate::export::mujoco::base_joints(&robot);
         let mut new = Vec::new();
         let place = self.place(node).unwrap_or_default();
