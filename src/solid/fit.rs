@@ -15,6 +15,7 @@
 
 use super::hull::{Hull, hull};
 use super::mesh::Mesh;
+use super::parts::{Parts, Split};
 use super::shape::{MOST_VERTICES, Pose, Shape};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
@@ -46,28 +47,18 @@ pub fn fit(mesh: &Mesh, most: usize, enough: f64) -> Fit {
     let mesh = &cut;
     let hull_volume = whole.as_ref().map_or(0.0, |h| h.volume);
     let all: Vec<usize> = (0..mesh.triangles.len()).collect();
-    let mut parts: Vec<Part> = vec![(all.clone(), enclose(mesh, &all))];
-    // the best way to split each part, found once and only where it is needed
-    let mut ways: Vec<Option<Split>> = Vec::new();
-    let mut best = parts.clone();
+    let first = enclose(mesh, &all);
+    let mut parts: Parts<Part> = Parts::new((all, first));
+    let mut best = parts.all.clone();
     let mut volume = union_volume(&shapes(&best));
-    while volume > enough * hull_volume && parts.len() < most.max(1) {
-        ways.extend(parts[ways.len()..].iter().map(|part| split(mesh, part)));
-        // the part whose split saves most
-        let saving = |i: &usize| ways[*i].as_ref().map_or(f64::NEG_INFINITY, |w| w.0);
-        let choice = (0..parts.len())
-            .rev()
-            .max_by(|a, b| saving(a).total_cmp(&saving(b)));
-        let Some((i, (_, halves))) = choice.and_then(|i| Some((i, ways[i].take()?))) else {
+    while volume > enough * hull_volume && parts.all.len() < most.max(1) {
+        if parts.split(|part| split(mesh, part)).is_none() {
             break;
-        };
-        parts.remove(i);
-        ways.remove(i);
-        parts.extend(halves);
-        let now = union_volume(&shapes(&parts));
+        }
+        let now = union_volume(&shapes(&parts.all));
         if now < volume {
             volume = now;
-            best.clone_from(&parts);
+            best.clone_from(&parts.all);
         }
     }
     of(original, whole, shapes(&best), volume)
@@ -116,11 +107,8 @@ fn hull_of(mesh: &Mesh, some: &[V]) -> Option<Hull> {
 /// Triangles and the shape that holds them.
 type Part = (Vec<usize>, Shape);
 
-/// What a split saves, m³, and its halves.
-type Split = (f64, [Part; 2]);
-
 /// The way to part a part in two that saves most.
-fn split(mesh: &Mesh, (triangles, shape): &Part) -> Option<Split> {
+fn split(mesh: &Mesh, (triangles, shape): &Part) -> Option<Split<Part>> {
     let halves = splits(mesh, triangles).into_par_iter().map(|split| {
         let halves = split.map(|t| {
             let c = enclose(mesh, &t);
@@ -129,11 +117,9 @@ fn split(mesh: &Mesh, (triangles, shape): &Part) -> Option<Split> {
         let saved = shape.volume() - halves.iter().map(|h| h.1.volume()).sum::<f64>();
         (saved, halves)
     });
-    let all: Vec<Split> = halves.collect();
+    let all: Vec<Split<Part>> = halves.collect();
     // the first of equals
-    let mut all = all.into_iter().rev();
-    let first = all.next()?;
-    Some(all.fold(first, |best, s| if s.0 >= best.0 { s } else { best }))
+    all.into_iter().rev().max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// A box stands for a part where its volume is less than this part of the capsule's.

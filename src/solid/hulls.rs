@@ -15,6 +15,7 @@ use super::distance::from_point;
 use super::fit::{self, Fit};
 use super::hull::hull;
 use super::mesh::Mesh;
+use super::parts::{Parts, Split};
 use super::shape::{MOST_VERTICES, Shape};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -29,9 +30,6 @@ const SKIN: f64 = 0.02;
 /// Splits that save less than this part of the whole, all together, are let be.
 const WORTH: f64 = 0.02;
 
-/// What a split saves, m³, and its halves.
-type Split = (f64, [Vec<usize>; 2]);
-
 /// Encloses a mesh by at most `most` hulls.
 pub fn hulls(mesh: &Mesh, most: usize) -> Fit {
     let cut = fit::subdivided(mesh);
@@ -39,30 +37,16 @@ pub fn hulls(mesh: &Mesh, most: usize) -> Fit {
     let [lo, hi] = cut.bounds();
     let skin = SKIN * (hi - lo).norm();
     let worth = WORTH * bulk(&cut, &all, skin);
-    // found once and only where it is needed
-    let mut ways: Vec<Option<Split>> = Vec::new();
-    let mut parts = vec![all];
+    let mut parts = Parts::new(all);
     // what all splits so far saved, and what they left
     let mut saved = 0.0;
-    let mut stages = vec![(saved, parts.clone())];
-    while parts.len() < most {
-        ways.extend(
-            parts[ways.len()..]
-                .iter()
-                .map(|part| split(&cut, part, skin)),
-        );
-        let saving = |i: &usize| ways[*i].as_ref().map_or(f64::NEG_INFINITY, |w| w.0);
-        let choice = (0..parts.len())
-            .rev()
-            .max_by(|a, b| saving(a).total_cmp(&saving(b)));
-        let Some((i, (more, halves))) = choice.and_then(|i| Some((i, ways[i].take()?))) else {
+    let mut stages = vec![(saved, parts.all.clone())];
+    while parts.all.len() < most {
+        let Some(more) = parts.split(|part| split(&cut, part, skin)) else {
             break;
         };
-        ways.remove(i);
-        parts.remove(i);
-        parts.extend(halves);
         saved += more;
-        stages.push((saved, parts.clone()));
+        stages.push((saved, parts.all.clone()));
     }
     // a ring saves nothing until it is in thirds: so all the splits are made, and the fewest that are about as good kept
     let best = stages.iter().map(|s| s.0).fold(0.0, f64::max);
@@ -90,9 +74,9 @@ fn bulk(mesh: &Mesh, triangles: &[usize], skin: f64) -> f64 {
 }
 
 /// The way to part triangles in two that saves most of the hulls' volume.
-fn split(mesh: &Mesh, triangles: &[usize], skin: f64) -> Option<Split> {
+fn split(mesh: &Mesh, triangles: &[usize], skin: f64) -> Option<Split<Vec<usize>>> {
     let whole = bulk(mesh, triangles, skin);
-    let all: Vec<Split> = fit::splits(mesh, triangles)
+    let all: Vec<Split<Vec<usize>>> = fit::splits(mesh, triangles)
         .into_par_iter()
         .map(|halves| {
             let left: f64 = halves.iter().map(|h| bulk(mesh, h, skin)).sum();

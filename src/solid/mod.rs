@@ -8,6 +8,7 @@
 //! | [`dae`] | triangles from COLLADA files |
 //! | [`hull`] | convex hull of points, its volume |
 //! | [`fit`] | capsules and boxes that enclose a mesh |
+//! | `parts` | a mesh in parts, split where that saves most |
 //! | [`hulls`] | hulls of few corners that enclose a mesh |
 
 pub mod dae;
@@ -16,6 +17,7 @@ pub mod fit;
 pub mod hull;
 pub mod hulls;
 pub mod mesh;
+mod parts;
 pub mod shape;
 
 pub use distance::{Separation, separation};
