@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional
+from typing import Any, Iterable, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,11 @@ import numpy.typing as npt
 from ._errors import unusable
 
 Array = npt.NDArray[np.float64]
+
+
+def floats(values: Iterable[Any]) -> Array:
+    """Numbers of a JSON document as an array; what is not determined is ``nan``."""
+    return np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
 
 def pandas() -> Any:

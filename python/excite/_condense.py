@@ -9,10 +9,10 @@ from typing import Any, Dict, Iterable, List, Optional, Sequence, Union
 
 from . import _excite
 from ._arguments import ExperimentLike, RobotLike, _pressure, _real_or_none, _robot
-from ._arrays import Array
+from ._arrays import Array, floats
 from ._errors import emit, notices, unusable
 from ._records import as_experiment
-from ._results import _floats, _Model
+from ._results import _Model
 from ._robot import PathLike, Robot, _names
 
 
@@ -62,22 +62,22 @@ class Merged(_Model):
     @property
     def values(self) -> Array:
         """Values of the parameters, those of a robot that can exist, ``(p,)``."""
-        return _floats(p["value"] for p in self._value["parameters"])
+        return floats(p["value"] for p in self._value["parameters"])
 
     @property
     def std(self) -> Array:
         """Their standard deviations: data and prior, ``(p,)``."""
-        return _floats(p["std"] for p in self._value["parameters"])
+        return floats(p["std"] for p in self._value["parameters"])
 
     @property
     def base_values(self) -> Array:
         """Base parameters by least squares alone, ``(b,)``."""
-        return _floats(p["unconstrained"] for p in self._value["base_parameters"])
+        return floats(p["unconstrained"] for p in self._value["base_parameters"])
 
     @property
     def base_std(self) -> Array:
         """Their standard deviations, ``(b,)``."""
-        return _floats(p["std"] for p in self._value["base_parameters"])
+        return floats(p["std"] for p in self._value["base_parameters"])
 
     @property
     def validation(self) -> Dict[str, Any]:

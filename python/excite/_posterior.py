@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple, Union
 import numpy as np
 
 from . import _excite
-from ._arrays import Array, from_columns, pandas
+from ._arrays import Array, floats, from_columns, pandas
 from ._errors import unusable
 from ._robot import PathLike, Robot
 
 if TYPE_CHECKING:
     from ._records import Experiment
-    from ._results import Identification
 
 #: Weakest prior of what the data do not see: nominal values that are good to 50 %.
 WEAKEST = 4.0
@@ -190,24 +189,24 @@ def _lacking(parts: "List[Tuple[Array, Array]]", inflation: float) -> Array:
     return out
 
 
-def sample(model: "Identification", n: int, seed: int) -> Posterior:
-    """Samples of an identification."""
-    robot = model.robot
-    listed = model.model["parameters"]
-    names, best = [p["name"] for p in listed], model.values
+def sample(robot: Robot, model: Dict[str, Any], result: Dict[str, Any], n: int, seed: int) -> Posterior:
+    """Samples of an identification: its robot, its ``model.json`` and its ``identification.json``."""
+    listed = model["parameters"]
+    names, best = [p["name"] for p in listed], floats(p["value"] for p in listed)
+    covariance = np.array([floats(row) for row in model["base_covariance"]])
     if [p.name for p in robot.parameters] != names or robot.closed:
         raise unusable("samples are for serial robots and trees whose robot file could be written")
     base = robot.base()
     t = np.zeros((len(base.kept), len(best)))
     t[np.arange(len(base.kept)), base.kept] = 1.0
     t[:, base.dropped] = base.k
-    strength = max(float(model.to_dict()["prior"]["strength"]), WEAKEST)
+    strength = max(float(result["prior"]["strength"]), WEAKEST)
     coordinates, jacobian = _coordinates(names, best)
     # whitened, by eigenvalues: what is known exactly needs no inverse
-    values, vectors = np.linalg.eigh(0.5 * (model.base_covariance + model.base_covariance.T))
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     white = (vectors / np.sqrt(np.maximum(values, 1e-14 * values.max()))).T @ t
     rng = np.random.default_rng(seed)
-    inflation = max(float(model.to_dict()["variance_inflation"]), 1.0)
+    inflation = max(float(result["variance_inflation"]), 1.0)
     rows = [_one(best, coordinates, jacobian, white, strength, rng) for _ in range(n)]
     return Posterior(robot, names, [p["unit"] for p in listed], np.array(rows), best, inflation)
 

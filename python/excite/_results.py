@@ -6,18 +6,15 @@ import html as _html
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
 
-from . import _excite
-from ._arrays import Array, pandas
+from . import _excite, _posterior
+from ._arrays import Array, floats, pandas
 from ._errors import Notice, emit, notices, unusable
 from ._robot import PathLike, Robot
 from ._trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from ._posterior import Posterior
 
 
 def frame_html(page: str, height: int = 720) -> str:
@@ -154,12 +151,12 @@ class Identification(_Model):
     @property
     def values(self) -> Array:
         """Identified values of the parameters, those of a robot that can exist, ``(p,)``."""
-        return _floats(p["value"] for p in self._model["parameters"])
+        return floats(p["value"] for p in self._model["parameters"])
 
     @property
     def std(self) -> Array:
         """Their standard deviations: data and prior, ``(p,)``."""
-        return _floats(p["std"] for p in self._model["parameters"])
+        return floats(p["std"] for p in self._model["parameters"])
 
     @property
     def base_names(self) -> List[str]:
@@ -169,20 +166,18 @@ class Identification(_Model):
     @property
     def base_values(self) -> Array:
         """Their values, ``(b,)``."""
-        return _floats(p["value"] for p in self._model["base_parameters"])
+        return floats(p["value"] for p in self._model["base_parameters"])
 
     @property
     def base_covariance(self) -> Array:
         """Covariance of the base parameters, ``(b, b)``."""
-        return np.array([_floats(row) for row in self._model["base_covariance"]])
+        return np.array([floats(row) for row in self._model["base_covariance"]])
 
-    def sample(self, n: int, seed: int = 0) -> "Posterior":
+    def sample(self, n: int, seed: int = 0) -> _posterior.Posterior:
         """``n`` robots that the data do not exclude, for what you randomise; all of them can exist."""
-        from ._posterior import sample
-
         if int(n) != n or n < 1 or int(seed) != seed or seed < 0:
             raise unusable(f"n and seed are whole numbers, n at least 1: not {n!r}, {seed!r}")
-        return sample(self, int(n), int(seed))
+        return _posterior.sample(self.robot, self._model, self._value, int(n), int(seed))
 
     @property
     def validation(self) -> Dict[str, Any]:
@@ -224,12 +219,12 @@ class Load(Result):
     @property
     def com(self) -> Array:
         """Centre of mass in the frame of the body that carries it, m, ``(3,)``; NaN where it is not known."""
-        return _floats(self._value["com"]["value"])
+        return floats(self._value["com"]["value"])
 
     @property
     def inertia(self) -> Array:
         """Inertia about the centre of mass, kg m², ``(3, 3)``; NaN where it is not known."""
-        xx, xy, xz, yy, yz, zz = _floats(self._value["inertia_com"]["value"])
+        xx, xy, xz, yy, yz, zz = floats(self._value["inertia_com"]["value"])
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     @property
@@ -237,13 +232,13 @@ class Load(Result):
         """Standard deviations: ``mass``, ``com``, and ``inertia`` in the order xx, xy, xz, yy, yz, zz."""
         v = self._value
         mass = np.array(_float(v["mass"]["std"]))
-        return {"mass": mass, "com": _floats(v["com"]["std"]), "inertia": _floats(v["inertia_com"]["std"])}
+        return {"mass": mass, "com": floats(v["com"]["std"]), "inertia": floats(v["inertia_com"]["std"])}
 
     def to_frame(self) -> Any:
         """The ten parameters as a pandas ``DataFrame``."""
         v, s = self._value, self.std
         names = ["mass", "com x", "com y", "com z", "xx", "xy", "xz", "yy", "yz", "zz"]
-        values = [self.mass, *self.com, *_floats(v["inertia_com"]["value"])]
+        values = [self.mass, *self.com, *floats(v["inertia_com"]["value"])]
         units = ["kg"] + ["m"] * 3 + ["kg m²"] * 6
         std = [float(s["mass"]), *s["com"], *s["inertia"]]
         return pandas().DataFrame({"parameter": names, "value": values, "std": std, "unit": units})
@@ -367,10 +362,6 @@ class Calibration(Result):
 
 def _float(x: Optional[float]) -> float:
     return float("nan") if x is None else float(x)
-
-
-def _floats(values: Any) -> Array:
-    return np.array([_float(x) for x in values], dtype=np.float64)
 
 
 __all__ = ["Calibration", "Diagnosis", "Identification", "Load", "Result"]

@@ -74,7 +74,7 @@ impl<'a> Course<'a> {
         let named = |name: &String| (name.clone(), None, None);
         let closed = plant.filter(|p| {
             let actuators: Vec<&str> = p.actuators().iter().map(|j| j.name.as_str()).collect();
-            p.mechanism().is_some() && p.coordinate_names() != actuators
+            p.coordinate_names() != actuators
         });
         let joints: Vec<(String, Option<Motion>, Option<f64>)> = match plant {
             Some(plant) => {

@@ -25,6 +25,7 @@ pub(crate) mod limits;
 mod mechanism_limits;
 pub(crate) mod path;
 mod problem;
+mod purpose;
 #[doc(hidden)]
 pub mod question;
 #[doc(hidden)]
@@ -41,7 +42,7 @@ pub(crate) mod torque;
 mod torque_rate;
 
 pub use criterion::{Condition, Criterion};
-pub use question::Question;
+pub use purpose::Question;
 pub use record::{Record, Status};
 pub use result::{Control, Design, Progress};
 pub use settings::Settings;

@@ -1,7 +1,7 @@
 //! Settings of a design: one struct for library, command line and report.
 
 use super::criterion::{Condition, Criterion};
-use super::question::{Question, ordinary_load};
+use super::purpose::{Question, ordinary_load};
 use crate::error::{Error, Result};
 use crate::plant::Plant;
 use crate::robot::inertia::Quantities;
@@ -180,5 +180,21 @@ impl Settings {
             }
         }
         Ok(())
+    }
+}
+
+impl Question {
+    /// Settings that serve it.
+    pub fn settings(self) -> Settings {
+        let (harmonics, period, periods) = self.motion();
+        Settings {
+            harmonics,
+            period,
+            periods,
+            question: Some(self),
+            criterion: self.criterion(),
+            condition: Condition::Weighted,
+            ..Settings::default()
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::controller::BANDWIDTH;
 use super::finding::Finding;
 use super::forward::MODELS;
 use super::result::Diagnosis;
+use super::second_encoder::SecondEncoder;
 use super::thresholds::THRESHOLDS;
 use serde_json::{Map, Value, json};
 
@@ -45,6 +46,27 @@ fn finding(f: &Finding) -> Value {
         "seen_in": if f.frozen { "frozen" } else { "refit" },
         "equation": f.equation,
         "separated_by": f.separated_by,
+    })
+}
+
+/// What the second encoder of a joint shows.
+fn second(s: &SecondEncoder) -> Value {
+    let seen = s.seen.iter().map(|e| {
+        json!({
+            "effect": e.effect, "value": number(e.value), "std": number(e.std), "unit": e.unit,
+            "explains": number(e.share), "indistinguishable_from": e.same,
+        })
+    });
+    json!({
+        "joint": s.joint,
+        "unit": s.unit,
+        "rms": number(s.rms),
+        "left": number(s.left),
+        "delay": { "value": number(s.delay[0]), "std": number(s.delay[1]), "unit": "s" },
+        "scale": { "value": number(1.0 + s.scale[0]), "std": number(s.scale[1]) },
+        "effects": seen.collect::<Vec<_>>(),
+        "holdout": s.holdout.map(number),
+        "not_asked": s.unasked,
     })
 }
 
@@ -176,6 +198,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
                 "joint": joint, "std": number(*std), "unit": unit,
             })).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
+        "second_encoder": d.second_encoder.iter().map(second).collect::<Vec<_>>(),
         "records": records,
         "untestable": d.untestable.iter().map(|(effect, place, v)| json!({
             "effect": effect, "joints": place, "visibility": number(*v),

@@ -55,6 +55,8 @@ pub(crate) mod result;
 mod reversal;
 pub(crate) mod rigid;
 pub(crate) mod search;
+#[doc(hidden)]
+pub mod second_encoder;
 pub(crate) mod settings;
 mod settle;
 #[doc(hidden)]
@@ -70,6 +72,8 @@ pub use gap::JointGap;
 pub use improve::Improved;
 pub use next::Proposal;
 pub use result::{Diagnosis, RecordGap, RuledOut};
+#[doc(hidden)]
+pub use second_encoder::{SecondEncoder, Seen};
 pub use settings::Settings;
 #[doc(hidden)]
 pub use traces::Trace;
@@ -239,6 +243,10 @@ pub fn of_logs(
             }
         }
     };
+    let second_encoder = second_encoder::find(&data, &cx.phi)?;
+    let claims = findings.iter().filter(|f| f.is_claim());
+    let claims: Vec<_> = claims.map(|f| (f.effect, f.joints.clone())).collect();
+    warnings.extend(second_encoder::warnings(&second_encoder, &claims));
     let next = settings.next.then(|| {
         progress("next experiment");
         next::propose(&evidence, &cx, &effects, &list, &findings, settings)
@@ -263,6 +271,7 @@ pub fn of_logs(
         holdout: data.predicts().then_some(decision.holdout),
         moves: data.moves(),
         at_rest,
+        second_encoder,
         unexplained: if data.moves() {
             decision.unexplained
         } else {

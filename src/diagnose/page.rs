@@ -3,6 +3,7 @@
 mod effects;
 mod next;
 mod residuals;
+mod second_encoder;
 mod simulated;
 mod simulators;
 mod summary;
@@ -111,6 +112,10 @@ pub fn html(d: &Diagnosis) -> String {
     let sections = [
         Section::new("", summary::summary(d)),
         Section::new("Which effect", effects::effects(d)),
+        Section::new(
+            "What the second encoders show",
+            second_encoder::second_encoder(d),
+        ),
         Section::new("Where the gap lies", residuals::residuals(d)),
         Section::new(
             "Over velocity, position, torque and time",

@@ -12,6 +12,7 @@ use super::noise::Source;
 use super::payload::is_free;
 use super::prior::Closeness;
 use super::search::Candidate;
+use super::second_encoder::SecondEncoder;
 use super::thresholds::THRESHOLDS as T;
 use super::traces::Trace;
 use super::verdict::Verdict;
@@ -64,6 +65,8 @@ pub struct Diagnosis {
     pub moves: bool,
     /// records in which the robot stands for a while, or all the time
     pub at_rest: Vec<AtRest>,
+    /// what second encoders show of the joints that have one
+    pub second_encoder: Vec<SecondEncoder>,
     /// share of the gap that stays
     pub unexplained: f64,
     /// share of the gap that any function of the state could explain, by cross-validation between

@@ -11,6 +11,7 @@ mod gate;
 mod motions;
 mod records;
 mod search;
+mod second;
 mod verdict;
 
 pub use gap::{Forward, Gap, Improved, Measure};
@@ -18,6 +19,7 @@ pub use gate::Gate;
 pub use motions::{Motions, Next};
 pub use records::{Carried, Closeness, Controller, Load, Noise, Prior, Rest, Reversals, Window};
 pub use search::{Search, Settle, Shapes};
+pub use second::Second;
 pub use verdict::{Confidence, Decoys, Entry, Hidden, Interval, Matters, Rivals};
 
 /// All of them.
@@ -71,6 +73,8 @@ pub struct Thresholds {
     pub next: Next,
     /// motions that the next one is chosen from
     pub motions: Motions,
+    /// second encoders
+    pub second: Second,
     /// the improved robot
     pub improved: Improved,
 }
@@ -101,5 +105,6 @@ pub const THRESHOLDS: Thresholds = Thresholds {
     forward: gap::FORWARD,
     next: motions::NEXT,
     motions: motions::MOTIONS,
+    second: second::SECOND,
     improved: gap::IMPROVED,
 };

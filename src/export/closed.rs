@@ -44,9 +44,7 @@ impl Format for Closed {
     }
 
     fn holds(&self, plant: &Plant) -> bool {
-        plant
-            .mechanism()
-            .is_some_and(|m| !matches!(m.platform().source, Source::Code(_)))
+        closed(plant).is_some_and(|m| !matches!(m.source, Source::Code(_)))
     }
 
     fn has(&self, _part: Part) -> bool {
@@ -54,12 +52,11 @@ impl Format for Closed {
     }
 
     fn write(&self, model: &Model) -> Result<String> {
-        let Some(mechanism) = model.plant.mechanism() else {
+        let Some(mechanism) = closed(model.plant) else {
             return Err(Error::Infeasible(
                 "nothing closes this robot to a chain".into(),
             ));
         };
-        let mechanism = &mechanism.platform();
         let joins = joins(mechanism)?;
         let mut lines = remark::lines(model.remarks, self);
         lines.extend(breakaway(model.robot));
@@ -70,6 +67,11 @@ impl Format for Closed {
             text(mechanism, model.robot, &joins)
         ))
     }
+}
+
+/// The mechanism with the pose of its platform as coordinates.
+fn closed(plant: &Plant) -> Option<&Mechanism> {
+    plant.mechanism().map(|m| m.platform())
 }
 
 /// A frame on a body; `None`: the base.

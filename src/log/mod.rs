@@ -98,7 +98,7 @@ pub struct Record {
     pub ddq: Option<Vec<Vec<f64>>>,
     /// commanded positions
     pub qref: Option<Vec<Vec<f64>>>,
-    /// link-side positions
+    /// link-side positions; an empty list for an actuator without a second encoder
     pub ql: Option<Vec<Vec<f64>>>,
     /// pose of platform or tool: `x y z qw qx qy qz`
     pub pose: Option<Vec<Vec<f64>>>,

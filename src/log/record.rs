@@ -71,6 +71,16 @@ fn take(table: &mut Table, group: &str, n: usize, path: &Path) -> Result<Option<
     }))
 }
 
+/// Takes the columns of a group of which an actuator may have none: its list is empty then.
+fn take_some(table: &mut Table, group: &str, n: usize) -> Option<Vec<Vec<f64>>> {
+    let mut one = |k: usize| match table.find(&format!("{group}{k}")) {
+        Some(c) => std::mem::take(&mut table.columns[c]),
+        None => Vec::new(),
+    };
+    let columns: Vec<Vec<f64>> = (1..=n).map(&mut one).collect();
+    columns.iter().any(|c| !c.is_empty()).then_some(columns)
+}
+
 /// Whether the names of the columns can be those of a log of `n` actuators.
 pub(super) fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Result<Vec<Warning>> {
     let n = joints.len();
@@ -197,7 +207,7 @@ impl Record {
             dq: take(&mut table, "dq", n, path)?,
             ddq: take(&mut table, "ddq", n, path)?,
             qref: take(&mut table, "qref", n, path)?,
-            ql: take(&mut table, "ql", n, path)?,
+            ql: take_some(&mut table, "ql", n),
             pose: None,
             pressures: None,
             resampled: false,
@@ -247,7 +257,9 @@ impl Record {
             ("pa", Order::Linear, pa),
             ("pb", Order::Linear, pb),
         ] {
-            for (k, column) in columns.into_iter().flatten().enumerate() {
+            let some = columns.into_iter().flatten().enumerate();
+            // an actuator may have no second encoder
+            for (k, column) in some.filter(|(_, c)| !c.is_empty()) {
                 out.push((format!("{group}{}", k + 1), order, column));
             }
         }

@@ -2,14 +2,12 @@
 //!
 //! Over a stretch `h` no distance changes faster than `L` (see [`clearance`](crate::collision::clearance)),
 //! so that it is nowhere less than `(d₀ + d₁ − L h)/2`. Stretches are halved, the longest first, until
-//! that is not below the margin for all pairs, or a distance is. The paths of a closed chain are sampled, and
-//! bounded between the samples by their second differences: stated, not proven.
+//! that is not below the margin for all pairs, or a distance is. Closed chains have no scene, so that the robot is a tree.
 
 use crate::collision::clearance::{Fineness, Path, clearances, reaches};
 use crate::collision::scene::{Scene, poses};
-use crate::error::{Error, Result};
-use crate::plant::Plant;
-use crate::robot::Motion;
+use crate::error::Error;
+use crate::robot::{Body, Motion, Robot};
 use crate::solid::Pose;
 use crate::trajectory::certificate::Proof;
 use std::collections::VecDeque;
@@ -28,14 +26,12 @@ const CLOSELY: Fineness = Fineness {
     tolerance: 1e-3,
     shortest: 1e-5,
 };
-/// Samples of a path of a closed chain.
-const SAMPLES: usize = 200;
 
 /// Where a path is blocked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blocked {
-    /// index of the pair; `None`: a pose that cannot be reached
-    pub pair: Option<usize>,
+    /// index of the pair
+    pub pair: usize,
     /// distance there, m
     pub distance: f64,
 }
@@ -62,7 +58,7 @@ pub struct Least {
 
 /// A robot among the things that it must not touch.
 pub struct Guard<'a> {
-    plant: &'a Plant,
+    robot: &'a Robot,
     /// volumes, obstacles and pairs
     pub scene: &'a Scene,
     /// reaches of the joints where they are the same for all paths
@@ -71,30 +67,27 @@ pub struct Guard<'a> {
 
 impl<'a> Guard<'a> {
     /// Of a robot and its scene.
-    pub fn new(plant: &'a Plant, scene: &'a Scene) -> Self {
+    pub fn new(robot: &'a Robot, scene: &'a Scene) -> Self {
         let mut guard = Guard {
-            plant,
+            robot,
             scene,
             reaches: None,
         };
-        let slides = |b: &crate::robot::Body| b.motion == Motion::Prismatic;
-        if !plant.robot().bodies.iter().any(slides) {
-            guard.reaches = Some(guard.reaches_within(&vec![0.0; plant.robot().dof()]));
+        let slides = |b: &Body| b.motion == Motion::Prismatic;
+        if !robot.bodies.iter().any(slides) {
+            guard.reaches = Some(guard.reaches_within(&vec![0.0; robot.dof()]));
         }
         guard
     }
 
     fn reaches_within(&self, largest: &[f64]) -> Vec<Vec<f64>> {
-        let reach = |pair| reaches(self.plant.robot(), self.scene, pair, largest);
+        let reach = |pair| reaches(self.robot, self.scene, pair, largest);
         self.scene.pairs.iter().map(reach).collect()
     }
 
     /// Names of the two of a pair, in words.
-    pub fn names(&self, pair: Option<usize>) -> String {
-        match pair.and_then(|p| self.scene.pairs.get(p)) {
-            Some(pair) => self.scene.names(pair).join(" and "),
-            None => "poses out of reach".into(),
-        }
+    pub fn names(&self, pair: usize) -> String {
+        self.scene.names(&self.scene.pairs[pair]).join(" and ")
     }
 
     fn margin(&self, pair: usize) -> f64 {
@@ -107,24 +100,21 @@ impl<'a> Guard<'a> {
     }
 
     /// Distances of some pairs in a posture.
-    fn distances(&self, x: &[f64], pairs: &[usize], at: &mut Vec<Pose>) -> Result<Vec<f64>> {
-        let robot = self.plant.robot();
-        poses(robot, &self.plant.posture(x)?, at);
+    fn distances(&self, q: &[f64], pairs: &[usize], at: &mut Vec<Pose>) -> Vec<f64> {
+        poses(self.robot, q, at);
         let distance = |&p: &usize| self.scene.separation(&self.scene.pairs[p], at).distance;
-        Ok(pairs.iter().map(distance).collect())
+        pairs.iter().map(distance).collect()
     }
 
     /// The pair of a posture that is short of its margin by most.
-    pub fn touching(&self, x: &[f64]) -> Option<Blocked> {
+    pub fn touching(&self, q: &[f64]) -> Option<Blocked> {
         let pairs: Vec<usize> = (0..self.scene.pairs.len()).collect();
-        let Ok(d) = self.distances(x, &pairs, &mut Vec::new()) else {
-            return Some(UNREACHED);
-        };
+        let d = self.distances(q, &pairs, &mut Vec::new());
         let room = |p: usize| d[p] - self.margin(p);
         let least = (0..d.len()).min_by(|a, b| room(*a).total_cmp(&room(*b)))?;
         // a distance that is not a number is no distance
         (!(room(least) >= -TOUCH)).then_some(Blocked {
-            pair: Some(least),
+            pair: least,
             distance: d[least],
         })
     }
@@ -134,24 +124,7 @@ impl<'a> Guard<'a> {
     /// # Errors
     /// A pair that does not.
     pub fn free(&self, path: &dyn Path) -> Result<(), Blocked> {
-        match self.plant.mechanism() {
-            None => self.proven(path),
-            Some(_) => {
-                let along = self.along(path).map_err(|_| UNREACHED)?;
-                let short = |p: &usize| !(stated(&along[*p]) >= self.kept(*p));
-                match (0..along.len()).find(short) {
-                    None => Ok(()),
-                    Some(p) => Err(Blocked {
-                        pair: Some(p),
-                        distance: along[p].iter().copied().fold(f64::INFINITY, f64::min),
-                    }),
-                }
-            }
-        }
-    }
-
-    fn proven(&self, path: &dyn Path) -> Result<(), Blocked> {
-        let n = self.plant.robot().dof();
+        let n = self.robot.dof();
         let own;
         let reaches = match &self.reaches {
             Some(known) => known,
@@ -164,11 +137,11 @@ impl<'a> Guard<'a> {
         let (mut q, mut v, mut at) = (vec![0.0; n], vec![0.0; n], Vec::new());
         let mut look = |t: f64, pairs: &[usize]| -> Result<Vec<f64>, Blocked> {
             path.position(t, &mut q);
-            let d = self.distances(&q, pairs, &mut at).map_err(|_| UNREACHED)?;
+            let d = self.distances(&q, pairs, &mut at);
             match (0..d.len()).find(|&k| !(d[k] >= self.kept(pairs[k]))) {
                 None => Ok(d),
                 Some(k) => Err(Blocked {
-                    pair: Some(pairs[k]),
+                    pair: pairs[k],
                     distance: d[k],
                 }),
             }
@@ -188,7 +161,7 @@ impl<'a> Guard<'a> {
                 }
                 if !(rate * h >= FINEST) || looks > LOOKS {
                     return Err(Blocked {
-                        pair: Some(pair),
+                        pair,
                         distance: d0[k].min(d1[k]),
                     });
                 }
@@ -208,96 +181,41 @@ impl<'a> Guard<'a> {
         Ok(())
     }
 
-    /// Distances of all pairs at even samples of a path.
-    fn along(&self, path: &dyn Path) -> Result<Vec<Vec<f64>>> {
-        let pairs: Vec<usize> = (0..self.scene.pairs.len()).collect();
-        let mut out = vec![Vec::with_capacity(SAMPLES + 1); pairs.len()];
-        let (mut x, mut at) = (vec![0.0; self.plant.coordinates()], Vec::new());
-        for i in 0..=SAMPLES {
-            path.position(path.duration() * i as f64 / SAMPLES as f64, &mut x);
-            let d = self.distances(&x, &pairs, &mut at)?;
-            out.iter_mut().zip(d).for_each(|(list, d)| list.push(d));
-        }
-        Ok(out)
-    }
-
-    /// Least clearance of a path: of a tree for all time, of a closed chain with the bound stated. `None`
-    /// where there are no pairs.
-    ///
-    /// # Errors
-    /// A pose of a closed chain that cannot be reached.
-    pub fn least(&self, path: &dyn Path) -> Result<Option<Least>> {
+    /// Least clearance of a path for all time. `None` where there are no pairs.
+    pub fn least(&self, path: &dyn Path) -> Option<Least> {
         // pair, met, time, bound
-        let (all, proof): (Vec<(usize, f64, f64, f64)>, _) = match self.plant.mechanism() {
-            None => {
-                let found = clearances(self.plant.robot(), self.scene, path, CLOSELY);
-                let each = found.iter().map(|c| (c.pair, c.met, c.time, c.bound));
-                (each.collect(), Proof::Enclosed)
-            }
-            Some(_) => {
-                let step = path.duration() / SAMPLES as f64;
-                let along = self.along(path)?;
-                let each = along.iter().enumerate().map(|(p, d)| {
-                    let k = (0..d.len()).min_by(|a, b| d[*a].total_cmp(&d[*b]));
-                    let k = k.unwrap_or(0);
-                    (p, d[k], k as f64 * step, stated(d))
-                });
-                (each.collect(), Proof::Stated)
-            }
-        };
+        let all: Vec<(usize, f64, f64, f64)> = clearances(self.robot, self.scene, path, CLOSELY)
+            .iter()
+            .map(|c| (c.pair, c.met, c.time, c.bound))
+            .collect();
         let closest = (all.iter())
             .min_by(|a, b| (a.1 - self.margin(a.0)).total_cmp(&(b.1 - self.margin(b.0))));
-        let Some(&(pair, met, time, _)) = closest else {
-            return Ok(None);
-        };
+        let &(pair, met, time, _) = closest?;
         let margin = self.margin(pair);
         let room = |&(p, _, _, bound): &(usize, f64, f64, f64)| bound - self.margin(p);
         let room = all.iter().map(room).fold(f64::INFINITY, f64::min);
-        Ok(Some(Least {
+        Some(Least {
             between: self.scene.names(&self.scene.pairs[pair]).map(String::from),
             met,
             time,
             // `free` has shown that there is that room
             bound: margin + room.max(-GIVE).min(met - margin),
             margin,
-            proof,
+            proof: Proof::Enclosed,
             unseen: self.scene.unseen.clone(),
-        }))
+        })
     }
 
     /// What is wrong with a posture that touches, as an error.
     pub fn refused(&self, which: &str, blocked: Blocked) -> Error {
-        Error::Infeasible(match blocked.pair {
-            None => {
-                format!("the pose at the {which} of the move cannot be reached; choose another one")
-            }
-            Some(p) => format!(
-                "at the {which} of the move {} are {:.4} m apart, {:.4} m are required; choose another \
-                 posture, or correct the volumes or the margin",
-                self.names(Some(p)),
-                blocked.distance,
-                self.margin(p)
-            ),
-        })
+        Error::Infeasible(format!(
+            "at the {which} of the move {} are {:.4} m apart, {:.4} m are required; choose another posture, or correct \
+             the volumes or the margin",
+            self.names(blocked.pair),
+            blocked.distance,
+            self.margin(blocked.pair)
+        ))
     }
-}
-
-const UNREACHED: Blocked = Blocked {
-    pair: None,
-    distance: f64::NAN,
-};
-
-/// The least of samples, less a quarter of the largest second difference: no parabola through them goes
-/// lower than half of that.
-fn stated(d: &[f64]) -> f64 {
-    let bend = d.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
-    let bend = bend.fold(0.0, f64::max);
-    // a distance that is not a number is kept by no comparison
-    d.iter()
-        .copied()
-        .reduce(|a, b| if b < a || b.is_nan() { b } else { a })
-        .unwrap_or(f64::NAN)
-        - 0.25 * bend
 }
 
 /// A straight line between two postures; its time runs from 0 to 1.

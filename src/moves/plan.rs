@@ -55,7 +55,7 @@ pub fn plan(
         low: scaled(&full, settings.scale),
         full,
         settings,
-        guard: scene.map(|s| Guard::new(plant, s)),
+        guard: scene.map(|s| Guard::new(plant.robot(), s)),
     };
     planner.untouched("start", &from.q)?;
     planner.untouched("target", &to.q)?;
@@ -274,10 +274,7 @@ impl Planner<'_> {
         let pairs: Vec<String> = (found.blocked.iter().take(NAMED))
             .map(|(pair, count)| {
                 let share = 100.0 * *count as f64 / total.max(1) as f64;
-                format!(
-                    "{} ({share:.0} % of the blocked lines)",
-                    guard.names(Some(*pair))
-                )
+                format!("{} ({share:.0} % of the blocked lines)", guard.names(*pair))
             })
             .collect();
         Error::Infeasible(format!(
@@ -383,7 +380,7 @@ impl Planner<'_> {
             legs: whole,
         };
         if let Some(guard) = &self.guard {
-            found.clearance = guard.least(&found)?;
+            found.clearance = guard.least(&found);
         }
         Ok(found)
     }

@@ -58,9 +58,7 @@ impl Search<'_, '_> {
         match self.guard.free(&Line { from, to }) {
             Ok(()) => true,
             Err(blocked) => {
-                if let Some(count) = blocked.pair.and_then(|p| self.counts.get_mut(p)) {
-                    *count += 1;
-                }
+                self.counts[blocked.pair] += 1;
                 false
             }
         }

@@ -38,6 +38,7 @@ use crate::collision::Scene;
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning};
 use crate::mechanism::Mechanism;
+use crate::mechanism::dimensions::Dimensions;
 use crate::robot::{Joint, JointTerm, Prior, Robot};
 use crate::trajectory::Space;
 use std::sync::{Arc, OnceLock};
@@ -251,6 +252,17 @@ impl Plant {
     /// Names of the coordinates `x`.
     pub fn coordinate_names(&self) -> Vec<String> {
         self.moved.joint_names()
+    }
+
+    /// A parallel robot with the pose of its platform as coordinates, whatever its series are of. `None`: nothing closes
+    /// this robot.
+    pub(crate) fn by_platform(&self) -> Option<Plant> {
+        self.mechanism().map(|m| Plant::from(m.platform().clone()))
+    }
+
+    /// Dimensions of a mechanism that has any.
+    pub(crate) fn dimensions(&self) -> Option<Dimensions> {
+        self.mechanism().and_then(|m| m.geometry().dimensions())
     }
 
     /// Number of coordinates `x`: rows of a motion.

@@ -38,6 +38,9 @@ pub struct Series {
     pub reference: Option<Samples>,
     /// measured torque, actuator-major
     pub tau: Vec<f64>,
+    /// position of the link less that of the motor, as measured, actuator-major; not a number where an actuator has no
+    /// second encoder
+    pub deflection: Option<Vec<f64>>,
     /// whether torque and motion of a sample rest on measured values; the others have no weight
     pub measured: Vec<bool>,
     /// whether an actuator stands still, actuator-major; empty where none ever does
@@ -221,6 +224,19 @@ impl Series {
             }
         }
         let mut tau = grid(raw.tau, stamped);
+        let deflection = log.ql.as_ref().map(|ql| {
+            let mut all = Vec::with_capacity(n * count);
+            for (ql, q) in ql.iter().zip(&log.q) {
+                match ql.is_empty() {
+                    true => all.resize(all.len() + count, f64::NAN),
+                    false => {
+                        let apart: Vec<f64> = ql.iter().zip(q).map(|(l, m)| l - m).collect();
+                        all.extend(resample(&log.t, &apart, log.step, dt, count, true));
+                    }
+                }
+            }
+            all
+        });
         let mut reference = raw.qref.map(|columns| grid(columns, stamped));
         let mut measured = vec![true; count];
         if raw.valid.contains(&false) {
@@ -292,6 +308,7 @@ impl Series {
             actuators,
             reference,
             tau,
+            deflection,
             measured,
             standing,
             position_noise,

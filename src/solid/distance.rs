@@ -17,7 +17,7 @@
 //! where the cores overlap. Of hulls only the normals of the faces are tried there, so that the depth of an overlap
 //! may be stated too large; that there is one is exact.
 
-use super::shape::{MOST_VERTICES, Pose, Shape};
+use super::shape::{MOST_VERTICES, Pose, Shape, nearest_on_segment};
 use nalgebra::Vector3;
 
 type V = Vector3<f64>;
@@ -74,6 +74,32 @@ fn swept(first: Placed, second: Placed, (p, q): (V, V)) -> Separation {
         on_first: p + n * (ra + depth),
         on_second: p - n * rb,
         normal: n,
+    }
+}
+
+impl Shape {
+    /// Distance of a point of the body's frame from the surface, negative inside, m.
+    pub fn signed_distance(&self, p: &Vector3<f64>) -> f64 {
+        match self {
+            Shape::Sphere { centre, radius } => (p - centre).norm() - radius,
+            Shape::Capsule { from, to, radius } => {
+                (p - nearest_on_segment(from, to, p)).norm() - radius
+            }
+            Shape::Box { pose, half } => {
+                let local = pose.rotation.transpose() * (p - pose.position);
+                let over = local.abs() - half;
+                let outside = over.map(|x| x.max(0.0)).norm();
+                outside + over.max().min(0.0)
+            }
+            Shape::Hull(h) => {
+                let heights = h.faces.iter().map(|(n, o)| n.dot(p) - o);
+                let highest = heights.fold(f64::NEG_INFINITY, f64::max);
+                match highest > 0.0 {
+                    true => from_point(&h.points, p) - h.radius,
+                    false => highest - h.radius,
+                }
+            }
+        }
     }
 }
 

@@ -4,7 +4,8 @@
 //! |---|---|
 //! | [`shape`] | sphere, capsule, box: a convex core swept by a radius |
 //! | [`distance`] | signed distance of two shapes, witness points and normal |
-//! | [`mesh`] | triangles from STL and OBJ files |
+//! | [`mesh`] | triangles |
+//! | [`formats`] | triangles from STL and OBJ files |
 //! | [`dae`] | triangles from COLLADA files |
 //! | [`hull`] | convex hull of points, its volume |
 //! | [`fit`] | capsules and boxes that enclose a mesh |
@@ -14,6 +15,7 @@
 pub mod dae;
 pub mod distance;
 pub mod fit;
+pub mod formats;
 pub mod hull;
 pub mod hulls;
 pub mod mesh;

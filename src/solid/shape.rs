@@ -7,7 +7,6 @@
 //!
 //! All lengths in m. Vertices are in the frame of the body that carries the shape.
 
-use super::distance;
 use super::hull::hull;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
@@ -97,7 +96,7 @@ pub struct Polytope {
     /// radius
     pub radius: f64,
     /// outward unit normals and offsets `nᵀ x` of the faces of the core
-    faces: Arc<[(Vector3<f64>, f64)]>,
+    pub(super) faces: Arc<[(Vector3<f64>, f64)]>,
     /// of the swept core, an edge's share left out, m³
     volume: f64,
 }
@@ -199,30 +198,6 @@ impl Shape {
             } => PI * r * r * (to - from).norm() + 4.0 / 3.0 * PI * r.powi(3),
             Shape::Box { half, .. } => 8.0 * half[0] * half[1] * half[2],
             Shape::Hull(h) => h.volume,
-        }
-    }
-
-    /// Distance of a point of the body's frame from the surface, negative inside, m.
-    pub fn signed_distance(&self, p: &Vector3<f64>) -> f64 {
-        match self {
-            Shape::Sphere { centre, radius } => (p - centre).norm() - radius,
-            Shape::Capsule { from, to, radius } => {
-                (p - nearest_on_segment(from, to, p)).norm() - radius
-            }
-            Shape::Box { pose, half } => {
-                let local = pose.rotation.transpose() * (p - pose.position);
-                let over = local.abs() - half;
-                let outside = over.map(|x| x.max(0.0)).norm();
-                outside + over.max().min(0.0)
-            }
-            Shape::Hull(h) => {
-                let heights = h.faces.iter().map(|(n, o)| n.dot(p) - o);
-                let highest = heights.fold(f64::NEG_INFINITY, f64::max);
-                match highest > 0.0 {
-                    true => distance::from_point(&h.points, p) - h.radius,
-                    false => highest - h.radius,
-                }
-            }
         }
     }
 

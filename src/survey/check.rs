@@ -52,7 +52,7 @@ pub fn check(plant: &Plant, records: &[Record]) -> Result<Vec<Warning>> {
             r.purpose == Purpose::Fit && r.payload == crate::log::Payload::None && !r.tau.is_empty()
         })
         .max_by_key(|r| r.len());
-    if let Some(record) = longest.filter(|_| plant.mechanism().is_none()) {
+    if let Some(record) = longest {
         let (frame, mut claims) = frame(record, plant);
         dynamics::examine_stated(&[frame], &mut claims, plant, &mut warnings);
         for w in &mut warnings {

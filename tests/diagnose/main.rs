@@ -9,5 +9,6 @@ mod next;
 mod parallel;
 mod poses;
 mod real;
+mod second_encoder;
 mod simulators;
 mod thresholds;

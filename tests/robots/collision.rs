@@ -3,7 +3,7 @@
 use excite::collision::clearance::{Fineness, Path, clearances};
 use excite::collision::scene::{Balls, Obstacle, Pair, Partner, Scene, Volume, poses};
 use excite::robot::{Body, Inertia, Joint, Motion, Robot};
-use excite::solid::{Pose, Shape, fit, hull, hulls, mesh, separation};
+use excite::solid::{Pose, Shape, fit, formats, hull, hulls, mesh, separation};
 use nalgebra::{Rotation3, Vector3};
 
 type V = Vector3<f64>;
@@ -531,27 +531,27 @@ fn hulls_hold_a_mesh_and_lie_close_to_it() {
 #[test]
 fn meshes_are_read_and_refused() {
     let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf 2 3 4\nf 3 1 -1\n";
-    let m = mesh::read("a.OBJ", obj).expect("a tetrahedron");
+    let m = formats::read("a.OBJ", obj).expect("a tetrahedron");
     assert_eq!(
         (m.points.len(), m.triangles.len(), m.closed()),
         (4, 4, true)
     );
     let text = b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid";
     assert_eq!(
-        mesh::read("a.stl", text)
+        formats::read("a.stl", text)
             .expect("one triangle")
             .triangles
             .len(),
         1
     );
-    assert!(mesh::read("a.stl", b"").is_err());
+    assert!(formats::read("a.stl", b"").is_err());
     assert!(
-        mesh::read("a.ply", b"")
+        formats::read("a.ply", b"")
             .unwrap_err()
             .contains("STL, OBJ or DAE")
     );
     assert!(
-        mesh::read("a.obj", b"v 0 0 0\nf 1 2 3\n")
+        formats::read("a.obj", b"v 0 0 0\nf 1 2 3\n")
             .unwrap_err()
             .contains("line 2")
     );
@@ -560,7 +560,7 @@ fn meshes_are_read_and_refused() {
     binary.extend([0; 50]);
     binary[96..100].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(
-        mesh::read("a.stl", &binary)
+        formats::read("a.stl", &binary)
             .unwrap_err()
             .contains("triangle 1")
     );

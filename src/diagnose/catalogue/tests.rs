@@ -82,6 +82,7 @@ fn record(plant: &Plant, x: &Samples, tau: Vec<f64>) -> Series {
         x: x.clone(),
         reference: None,
         tau,
+        deflection: None,
         measured: vec![true; x.count],
         standing: Vec::new(),
         position_noise: vec![0.0; n],

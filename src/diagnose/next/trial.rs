@@ -178,6 +178,7 @@ impl Trial<'_> {
             x,
             reference: None,
             tau: vec![0.0; n * count],
+            deflection: None,
             measured: vec![true; count],
             standing,
             position_noise: vec![0.0; n],

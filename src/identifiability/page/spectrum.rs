@@ -1,7 +1,7 @@
 //! Singular values and the course of the design.
 
+use crate::design::Question;
 use crate::design::criterion::{Condition, Criterion};
-use crate::design::question::Question;
 use crate::design::record::{Record, Status};
 use crate::design::settings::Settings;
 use crate::identifiability::Assessment;

@@ -85,7 +85,7 @@ pub(in crate::identifiability) fn fill(
         let carries = robot.bodies.iter().any(|k| k.parent == Some(b));
         let far = |c: &Vector3<f64>| c.norm() > 1e-3;
         let com = robot.bodies[b].inertia.com().filter(far);
-        com.filter(|_| !carries && plant.mechanism().is_none())
+        com.filter(|_| !carries && !plant.closed())
     };
     let joints = plant.actuators();
     let mut view = View {

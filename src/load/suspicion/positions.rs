@@ -35,8 +35,7 @@ pub fn check(record: &Record, plant: &Plant) -> Result<()> {
     };
     let linear = joints.iter().all(|j| j.motion == Motion::Prismatic);
     let mut readings = Vec::new();
-    if let Some(Dimensions::Legs(legs)) = plant.mechanism().and_then(|m| m.geometry().dimensions())
-    {
+    if let Some(Dimensions::Legs(legs)) = plant.dimensions() {
         let zero: Vec<f64> = legs.iter().map(|l| -l.zero).collect();
         readings.push(Reading {
             factor: 1.0,

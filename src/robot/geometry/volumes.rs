@@ -3,8 +3,9 @@
 use super::{Form, Geometry, find};
 use crate::error::{Warning, WarningKind};
 use crate::solid::fit::{self, Fit};
+use crate::solid::formats;
 use crate::solid::hulls::hulls;
-use crate::solid::mesh::{self, Mesh};
+use crate::solid::mesh::Mesh;
 use crate::solid::{Pose, Shape};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -191,7 +192,7 @@ fn enclose(
             let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
             let name = path.to_string_lossy();
             let mut mesh =
-                mesh::read(&name, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
+                formats::read(&name, &bytes).map_err(|e| format!("{}: {e}", path.display()))?;
             for p in &mut mesh.points {
                 p.component_mul_assign(scale);
             }

@@ -8,7 +8,7 @@
 //! | module | what |
 //! |---|---|
 //! | `tree` | XML in and out |
-//! | `value`, `python`, `token`, `expression` | values, YAML, expressions |
+//! | `value`, `python`, `token`, `expression`, `yaml` | values, expressions, values of YAML files |
 //! | `scope`, `text` | properties, `${…}` and `$(…)` in text |
 //! | `directive` | elements of xacro |
 //! | `macros` | macros and their parameters |
@@ -23,6 +23,7 @@ mod text;
 mod token;
 mod tree;
 mod value;
+mod yaml;
 
 use crate::error::{Error, Result};
 use crate::robot::file::text::read_text;

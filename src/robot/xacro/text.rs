@@ -2,8 +2,8 @@
 
 use super::expression::{Names, evaluate};
 use super::scope::Entry;
-use super::value::{Value, yaml};
-use super::{DEEPEST, Work, Wrong, packages};
+use super::value::Value;
+use super::{DEEPEST, Work, Wrong, packages, yaml};
 use std::rc::Rc;
 
 impl Work {
@@ -180,7 +180,7 @@ impl Names for Seen<'_> {
         Ok(Some(match name {
             "load_yaml" => {
                 let (path, text) = self.work.open(&one)?;
-                yaml(&text).map_err(|e| format!("{}: {e}", path.display()))?
+                yaml::read(&text).map_err(|e| format!("{}: {e}", path.display()))?
             }
             "abs_filename" => {
                 let folder = self.work.files.last().and_then(|f| f.parent());
