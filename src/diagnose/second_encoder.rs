@@ -178,12 +178,17 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
             .as_ref()
             .map_or(f64::NAN, |d| d[j * r.count + i])
     };
+    let seconds: f64 = fitted
+        .iter()
+        .map(|k| data.records[*k].count as f64 * data.records[*k].dt)
+        .sum();
+    // short records are cut finer
+    let length = T.second.block.min(0.5 * seconds / T.second.blocks as f64);
     let mut blocks = Blocks::new(next);
     for (z, &k) in fitted.iter().enumerate() {
         let at = rows(data, k, j, every);
-        let long = (T.second.block / (data.records[k].dt * every as f64))
-            .ceil()
-            .max(1.0);
+        let step = data.records[k].dt * every as f64;
+        let long = (length / step).ceil().max(1.0);
         for part in at.chunks(long as usize) {
             let a: Vec<f64> = part.iter().flat_map(|i| row(k, *i, Some(z))).collect();
             let d: Vec<f64> = part.iter().map(|i| deflection(k, *i)).collect();

@@ -52,7 +52,7 @@ fn urdf(gear: bool) -> (String, String) {
     (urdf, toml)
 }
 
-/// A run of 20 s: semi-implicit Euler at 20 kHz under a PD controller of the motor, logged at 250 Hz.
+/// A run of two periods: semi-implicit Euler at 20 kHz under a PD controller of the motor, logged at 250 Hz.
 fn run(b: Between, phase: f64, second: bool) -> String {
     let h = 5e-5;
     let inertia = TENSOR + MASS * REACH * REACH;
@@ -78,7 +78,7 @@ fn run(b: Between, phase: f64, second: bool) -> String {
     let round = |x: f64| (x / RESOLUTION).round() * RESOLUTION;
     let (mut sum, mut link_before) = (0.0, ql);
     let per = 80;
-    for i in 0..(20.0 / h) as usize {
+    for i in 0..(20.1 / h) as usize {
         let t = i as f64 * h;
         let slope = (want(t + 1e-5) - want(t - 1e-5)) / 2e-5;
         let tau = 9000.0 * (want(t) - qm) + 260.0 * (slope - vm);

@@ -111,13 +111,14 @@ fn merged_factors_give_what_all_records_give() {
 #[test]
 fn breakaway_friction_is_not_condensed_in_silence() {
     let plain = plant();
-    let records = records(&plain);
+    // one record is enough: the friction is searched for in all that there are
+    let records = &records(&plain)[..1];
     let mut robot = plain.robot().clone();
     robot.joints[0].stribeck.fit = true;
-    let factor = of(&Plant::from(&robot), &records);
+    let factor = of(&Plant::from(&robot), records);
     let said = |all: &[excite::Warning]| all.iter().any(|w| w.subject == "breakaway friction");
     assert!(said(&factor.header.warnings));
-    assert!(!said(&of(&plain, &records).header.warnings));
+    assert!(!said(&of(&plain, records).header.warnings));
     let found = merged(&plain, &[&factor], &settings(Method::Wls));
     assert!(said(&found.warnings));
 }

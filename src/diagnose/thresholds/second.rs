@@ -3,7 +3,7 @@
 /// Deflection between two encoders of one joint.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Second {
-    /// Length of the blocks that are left out in turn. Unit: s. Source: by hand.
+    /// Length of the blocks that are left out in turn, less where that makes too few. Unit: s. Source: by hand.
     pub block: f64,
     /// Fewest blocks that decide. Unit: count. Source: by hand.
     pub blocks: usize,
