@@ -216,14 +216,7 @@ fn motion(m: &Machine, r: &Record, wander: &[Sine], t: f64) -> Motion {
 }
 
 /// Lengths at a time, and forces as a sensor without noise shows them.
-fn real_force(
-    m: &Machine,
-    extra: &Extra,
-    r: &Record,
-    wander: &[Sine],
-    start: f64,
-    t: f64,
-) -> Legs {
+fn real_force(m: &Machine, extra: &Extra, r: &Record, wander: &[Sine], start: f64, t: f64) -> Legs {
     let mut bodies = vec![m.platform.clone()];
     bodies.extend(extra.load.iter().cloned());
     let t = t - extra.delay;
@@ -284,9 +277,8 @@ fn log(
         out.q.push(std::array::from_fn(|j| {
             ((legs.length[j] - m.zero[j]) / m.step).round() * m.step
         }));
-        out.force.push(std::array::from_fn(|j| {
-            force[j] + sensors[j].next(rng)
-        }));
+        out.force
+            .push(std::array::from_fn(|j| force[j] + sensors[j].next(rng)));
     }
     out
 }

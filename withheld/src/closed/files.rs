@@ -13,7 +13,7 @@ use std::path::Path;
 pub fn case(case: &Case, seed: u64, folder: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let mut rng = Random::new(seed, case.plan.index, 230);
-    let text = robot(&case.machine, case.legs_known, &mut rng);
+    let text = robot(&case.machine, case.legs_known, 1.0, &mut rng);
     std::fs::write(folder.join("robot.toml"), text)?;
     let mut experiment = String::from("robot = \"robot.toml\"\n");
     for (record, log) in case.records.iter().zip(&case.logs) {
@@ -76,9 +76,9 @@ fn doubtful(b: &Body, error: f64, rng: &mut Random) -> Body {
     }
 }
 
-/// The robot file.
-fn robot(m: &Machine, legs_known: bool, rng: &mut Random) -> String {
-    let error = if m.identified { 0.004 } else { 0.05 };
+/// The robot file, off by `doubt` times what is usual; 0: the machine as it is.
+pub fn robot(m: &Machine, legs_known: bool, doubt: f64, rng: &mut Random) -> String {
+    let error = doubt * if m.identified { 0.004 } else { 0.05 };
     let z = m.home[2];
     let terms = match m.offsets {
         true => r#"["viscous", "coulomb", "offset"]"#,
@@ -121,10 +121,11 @@ fn robot(m: &Machine, legs_known: bool, rng: &mut Random) -> String {
         }
     }
     for (j, d) in m.drives.iter().enumerate() {
-        let (dry, viscous, offset) = match m.identified {
-            true => (0.03, 0.04, 0.3),
-            false => (0.15, 0.2, 1.0),
-        };
+        let [dry, viscous, offset] = match m.identified {
+            true => [0.03, 0.04, 0.3],
+            false => [0.15, 0.2, 1.0],
+        }
+        .map(|e| doubt * e);
         let _ = write!(
             s,
             "[[joint]]\nname = \"leg{}\"\nposition = [-0.05, 0.5]\nvelocity = 1.2\nacceleration = 12.0\neffort = 1200.0\n\

@@ -138,9 +138,8 @@ pub fn forces(legs: &[Leg; 6], m: &Motion, carried: &[Body], rubs: Rubbing, push
         let (ad, bd, w) = turn(&end);
         let rate = end.dot(&s);
         let twist = x0.cross(&y1) * (ad * bd);
-        let rest = pull
-            - w.cross(&s) * (2.0 * rate)
-            - (twist.cross(&s) + w.cross(&w.cross(&s))) * length;
+        let rest =
+            pull - w.cross(&s) * (2.0 * rate) - (twist.cross(&s) + w.cross(&w.cross(&s))) * length;
         let (_, _, turned) = turn(&rest);
         let dw = turned + twist;
         let ends: [V; 6] = unit.map(|(v, o)| v + o.cross(&b));
