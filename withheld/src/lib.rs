@@ -4,6 +4,7 @@
 pub mod attach;
 pub mod case;
 pub mod chain;
+pub mod closed;
 pub mod disturb;
 pub mod effects;
 pub mod friction;

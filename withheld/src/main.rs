@@ -7,7 +7,7 @@ mod run;
 use clap::{Args, Parser, Subcommand};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use withheld::{case, effects, plan, write};
+use withheld::{case, closed, effects, plan, write};
 
 #[derive(Parser)]
 #[command(about = "Check the diagnosis on robots whose effect is withheld")]
@@ -47,6 +47,9 @@ struct Set {
     /// Every effect at five sizes instead of a mixed set; a comma-separated list, or `all`
     #[arg(long, value_name = "EFFECTS")]
     ladder: Option<String>,
+    /// Hexapods instead of arms
+    #[arg(long, conflicts_with = "ladder")]
+    closed: bool,
     /// Only the cases of these numbers, separated by commas
     #[arg(long, value_delimiter = ',')]
     only: Vec<usize>,
@@ -96,22 +99,32 @@ fn generate(set: &Set) -> Result<(), String> {
     if path.exists() {
         std::fs::remove_file(&path).map_err(|e| at(&path, &e))?;
     }
-    let cases: Result<Vec<serde_json::Value>, String> = plans(set)?
-        .par_iter()
-        .filter(|p| set.only.is_empty() || set.only.contains(&p.index))
-        .map(|plan| {
-            let case = case::build(set.seed, plan)?;
-            let folder = set.output.join(format!("case_{:03}", plan.index));
-            write::case(&case, &folder).map_err(|e| at(&folder, &e))?;
-            eprintln!(
-                "case {:3} {:8} {}",
-                plan.index,
-                plan.kind,
-                plan.effects.join(" + ")
-            );
-            Ok(write::truth(&case))
-        })
-        .collect();
+    let wanted = |index: usize| set.only.is_empty() || set.only.contains(&index);
+    let folder = |index: usize| set.output.join(format!("case_{index:03}"));
+    let cases: Result<Vec<serde_json::Value>, String> = match set.closed {
+        true => (closed::plan::mixed(set.cases).par_iter())
+            .filter(|p| wanted(p.index))
+            .map(|plan| {
+                let (case, folder) = (closed::case::build(set.seed, plan), folder(plan.index));
+                closed::files::case(&case, set.seed, &folder).map_err(|e| at(&folder, &e))?;
+                Ok(closed::files::truth(&case))
+            })
+            .collect(),
+        false => (plans(set)?.par_iter())
+            .filter(|p| wanted(p.index))
+            .map(|plan| {
+                let (case, folder) = (case::build(set.seed, plan)?, folder(plan.index));
+                write::case(&case, &folder).map_err(|e| at(&folder, &e))?;
+                eprintln!(
+                    "case {:3} {:8} {}",
+                    plan.index,
+                    plan.kind,
+                    plan.effects.join(" + ")
+                );
+                Ok(write::truth(&case))
+            })
+            .collect(),
+    };
     let truth = serde_json::json!({ "seed": set.seed, "cases": cases? });
     let text = serde_json::to_string_pretty(&truth).map_err(|e| e.to_string())?;
     std::fs::write(&path, text + "\n").map_err(|e| at(&path, &e))

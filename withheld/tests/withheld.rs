@@ -278,3 +278,43 @@ fn the_scorer_counts_what_it_says() {
     assert_eq!((j.wrong.len(), j.outcomes.len()), (1, 0));
     assert!(score::judge(&truth("clean", ""), &json!({}), 1.0).is_err());
 }
+
+/// Forces by partial velocities against the library's, which come from a tree of bodies.
+#[test]
+fn a_hexapod_agrees_with_the_library() {
+    use withheld::closed::{files, hexapod, machine, sines};
+    let mut rng = Random::new(11, 1, 0);
+    let mut m = machine::machine(true, &mut rng);
+    for d in &mut m.drives {
+        (d.dry, d.offset) = (0.0, 0.0);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.toml");
+    std::fs::write(&path, files::robot(&m, true, 0.0, &mut rng)).unwrap();
+    let plant = excite::plant::Plant::load(path.to_str().unwrap()).unwrap();
+    let motion = sines::periodic(10.0, 1.0, &mut rng);
+    let count = 200;
+    let mut x = Samples::zeros(6, count);
+    let mut own = vec![0.0; 6 * count];
+    let mut size = 0.0f64;
+    for s in 0..count {
+        let [q, d, dd] = sines::at(&motion, &m.home, 0.05 * s as f64);
+        for k in 0..6 {
+            let at = k * count + s;
+            (x.q[at], x.qd[at], x.qdd[at]) = (q[k], d[k], dd[k]);
+        }
+        let state = hexapod::Motion::new(&q, &d, &dd);
+        let body = std::slice::from_ref(&m.platform);
+        let rest = (hexapod::Rubbing::default(), nalgebra::Vector3::zeros());
+        let legs = hexapod::forces(&m.legs, &state, body, rest.0, rest.1);
+        for j in 0..6 {
+            own[j * count + s] = m.drives[j].logged(legs.force[j], legs.rate[j]);
+            size = size.max(own[j * count + s].abs());
+        }
+    }
+    let theirs = plant.nominal_torque(&x).unwrap();
+    let worst = own.iter().zip(&theirs);
+    let worst = worst.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+    // the file has nine decimals
+    assert!(worst < 1e-6 * size, "{worst} N of {size} N");
+}
