@@ -171,7 +171,7 @@ fn findings(d: &PoseDiagnosis) -> Section {
                 html! { @if claimed { strong { (words(f.effect)) } } @else { (words(f.effect)) } },
                 html! { (f.places.join(" or ")) },
                 html! { (percent(f.confidence)) },
-                html! { (share(f.explains)) " (" (percent(f.interval[0])) " to " (percent(f.interval[1])) ")" },
+                html! { (share(f.explains)) " (" (share(f.interval[0])) " to " (share(f.interval[1])) ")" },
                 html! { @if let Some(h) = f.holdout { (share(h)) } @else { "–" } },
                 html! { (values.join("; ")) },
                 html! { (rivals.join(", ")) },
