@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ._planned import Assessment, Design, Export, Interrupted, Simulation
     from ._posterior import Posterior
     from ._records import Experiment, Record
-    from ._results import Calibration, Diagnosis, Identification, Load, Result
+    from ._results import Calibration, Diagnosis, Identification, Load, PoseDiagnosis, Result
     from ._robot import BaseParameters, Parameter, Robot
     from ._simulate import simulate
     from ._trajectory import Motion, Samples, Trajectory
@@ -49,7 +49,7 @@ _PARTS = {
     "_posterior": ("Posterior",),
     "_records": ("Experiment", "Record"),
     "_planned": ("Assessment", "Design", "Export", "Interrupted", "Simulation"),
-    "_results": ("Calibration", "Diagnosis", "Identification", "Load", "Result"),
+    "_results": ("Calibration", "Diagnosis", "Identification", "Load", "PoseDiagnosis", "Result"),
     "_robot": ("BaseParameters", "Parameter", "Robot"),
     "_simulate": ("simulate",),
     "_trajectory": ("Motion", "Samples", "Trajectory"),
@@ -76,6 +76,7 @@ __all__ = [
     "Motion",
     "Notice",
     "Parameter",
+    "PoseDiagnosis",
     "Posterior",
     "Record",
     "Result",

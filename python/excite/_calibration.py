@@ -20,6 +20,7 @@ COLUMNS = {
     "gauge": ["reading"],
     "point": [],
     "plane": [],
+    "loop": [],
 }
 KEYS = {"kind", "q", "values", "use", "group", "std", "angle_std", "instrument", "cov"}
 
@@ -30,6 +31,7 @@ def write(
     measurements: Sequence[Mapping[str, Any]],
     distances: Sequence[Mapping[str, Any]],
     frame: Optional[str],
+    other: Optional[str],
     gravity: Optional[str],
     effects: Optional[Sequence[str]],
     tolerances: Optional[Mapping[str, float]],
@@ -38,7 +40,7 @@ def write(
     for name, text in robot._texts().items():
         Path(folder, name).write_text(text, encoding="utf-8")
     lines = [f"robot = {json.dumps(robot._named())}"]
-    lines += [f"{k} = {json.dumps(v)}" for k, v in (("frame", frame), ("gravity", gravity)) if v is not None]
+    lines += [f"{k} = {json.dumps(v)}" for k, v in (("frame", frame), ("other", other), ("gravity", gravity)) if v is not None]
     if effects is not None:
         lines.append(f"effects = {json.dumps(list(effects))}")
     for k, m in enumerate(measurements):

@@ -331,6 +331,48 @@ class Diagnosis(_Model):
         return f"<excite.Diagnosis of {self._value.get('robot', '')}: {self.verdict}{': ' + named if named else ''}>"
 
 
+class PoseDiagnosis(Diagnosis):
+    """Why the geometry of a robot and what was seen of its tool disagree; of a ``calibration.toml``."""
+
+    _may = ("next.csv",)
+
+    @property
+    def holdout_shrink(self) -> float:
+        """Share of the gap on rows held out that is gone with all findings; NaN without such rows."""
+        return _float(self._value["holdout_shrink"])
+
+    @property
+    def outliers(self) -> List[int]:
+        """Rows that do not belong, from 0 through all files."""
+        return [int(i) for i in self._value["outliers"]]
+
+    @property
+    def robot(self) -> Robot:
+        """None is written: :func:`calibrate` does that."""
+        raise unusable("a diagnosis of poses writes no robot; excite.calibrate does")
+
+    @property
+    def next(self) -> Optional[Trajectory]:
+        """None: it is postures that tell more, see :attr:`postures`."""
+        return None
+
+    @property
+    def postures(self) -> Optional[Dict[str, Array]]:
+        """Postures to measure next, where there are some that tell more: ``q`` (rad or m, ``(rows, joints)``) and, where the
+        side matters, ``approach`` (1: come from below, −1: from above)."""
+        text = self._files.get("next.csv")
+        if text is None:
+            return None
+        names, *lines = text.splitlines()
+        table = np.array([[float(c) for c in line.split(",")] for line in lines])
+        of = [n.rstrip("0123456789") for n in names.split(",")]
+        return {k: table[:, [i for i, n in enumerate(of) if n == k]] for k in ("q", "approach") if k in of}
+
+    def __repr__(self) -> str:
+        named = ", ".join(f"{c['effect']} ({' or '.join(c['places'])})" for c in self.claims)
+        return f"<excite.PoseDiagnosis of {self._value.get('robot', '')}: {self.verdict}{': ' + named if named else ''}>"
+
+
 class Calibration(Result):
     """A calibrated robot."""
 
@@ -364,4 +406,4 @@ def _float(x: Optional[float]) -> float:
     return float("nan") if x is None else float(x)
 
 
-__all__ = ["Calibration", "Diagnosis", "Identification", "Load", "Result"]
+__all__ = ["Calibration", "Diagnosis", "Identification", "Load", "PoseDiagnosis", "Result"]

@@ -25,7 +25,7 @@ from ._errors import emit, unusable
 from ._planned import Assessment, Design, Export, Interrupted
 from ._progress import Bar, Progress
 from ._records import as_experiment
-from ._results import CONTROLLERS, Calibration, Diagnosis, Identification, Load
+from ._results import CONTROLLERS, Calibration, Diagnosis, Identification, Load, PoseDiagnosis
 from ._robot import PathLike, _names
 from ._trajectory import Motion, Trajectory, as_trajectory
 
@@ -297,12 +297,20 @@ def diagnose(
     run next (``excite diagnose``).
 
     Args:
+        experiment: an experiment; or the path of a ``calibration.toml``, which is diagnosed for the geometry that the robot
+            lacks and gives a :class:`PoseDiagnosis` (``next`` and ``seed`` alone matter then).
         next: whether the next motion is designed.
         next_tries: random steps by which the best design of it is improved.
         seed: of its random starts.
         atmosphere: pressure outside of the cylinders, Pa, for records with chamber pressures in place of forces.
         progress: as for :func:`design`.
     """
+    if isinstance(experiment, (str, os.PathLike)) and _excite.is_calibration(Path(os.fspath(experiment))):
+        poses = PoseDiagnosis(
+            _excite.diagnose_poses(Path(os.fspath(experiment)), next=bool(next), seed=_integer("seed", seed))
+        )
+        emit(poses.warnings)
+        return poses
     core = as_experiment(experiment)._native
     with Bar(progress, "diagnose") as bar:
         report = _excite.diagnose(
@@ -325,6 +333,7 @@ def calibrate(
     measurements: Sequence[Mapping[str, Any]] = (),
     distances: Sequence[Mapping[str, Any]] = (),
     frame: Optional[str] = None,
+    other: Optional[str] = None,
     gravity: Optional[str] = None,
     effects: Optional[Sequence[str]] = None,
     tolerances: Optional[Mapping[str, float]] = None,
@@ -337,14 +346,15 @@ def calibrate(
         calibration: path of a ``calibration.toml``; or, instead of it, what such a file holds:
         robot: the robot.
         measurements: one dictionary a placement: ``kind`` (``"pose"``, ``"position"``, ``"point"``, ``"plane"``,
-            ``"gauge"``), ``q`` (readings, rad or m, ``(rows, joints)``), ``values`` (pose ``x y z qw qx qy qz``, position
-            ``x y z``, m, or ``reading``, m; ``(rows, columns)``; none for points and planes), and if wanted ``use``,
+            ``"gauge"``, ``"loop"``), ``q`` (readings, rad or m, ``(rows, joints)``), ``values`` (pose ``x y z qw qx qy qz``, position
+            ``x y z``, m, or ``reading``, m; ``(rows, columns)``; none for points, planes and loops), and if wanted ``use``,
             ``group``, ``std`` (m), ``angle_std`` (rad), ``instrument``, ``cov`` (``(rows, 6, 6)`` of poses).
         distances: ``{"between": (0, 1), "value": m, "std": m}`` between the points of two measurements, by their place.
         frame: name of the frame that the measurement sees.
+        other: of loops: name of the second arm's frame.
         gravity: robot whose inertia tells the torques of gravity.
-        effects: of ``"joint_compliance"``, ``"encoder_eccentricity"``, ``"backlash"``; those that the data bear out where
-            left out.
+        effects: of ``"joint_compliance"``, ``"encoder_eccentricity"``, ``"backlash"``, ``"link_compliance"``; those of the
+            first three that the data bear out where left out.
         tolerances: ``length``, ``pose_length`` (m), ``angle``, ``pose_angle`` (rad): what is known beforehand.
         algorithm: of parallel robots: ``"inverse"``, ``"implicit"``, ``"forward"``.
         orientation: whether the measured orientation of a parallel robot is kept to one that it can take.
@@ -360,7 +370,7 @@ def calibrate(
 
         with tempfile.TemporaryDirectory() as folder:
             path = write(
-                Path(folder), _robot(robot), measurements, distances, frame, gravity, effects, tolerances
+                Path(folder), _robot(robot), measurements, distances, frame, other, gravity, effects, tolerances
             )
             try:
                 report = _excite.calibrate(path, algorithm=algorithm, orientation=bool(orientation))

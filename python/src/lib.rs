@@ -45,6 +45,8 @@ fn _excite(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(condense::merge, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::load, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::diagnose, m)?)?;
+    m.add_function(wrap_pyfunction!(verbs::is_calibration, m)?)?;
+    m.add_function(wrap_pyfunction!(verbs::diagnose_poses, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::calibrate, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::export, m)?)?;
     m.add_function(wrap_pyfunction!(verbs::formats, m)?)?;

@@ -7,6 +7,7 @@ use crate::named::named;
 use crate::plant::Plant;
 use crate::records::Experiment;
 use crate::report::{Report, scene};
+use excite::calibrate::gap;
 use excite::cli::{export as program, identify as terms, pretty, unwritten};
 use excite::controller::{Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
 use excite::export::{Model, write};
@@ -196,6 +197,35 @@ pub fn diagnose(
         })
     };
     Ok(call(py, progress.as_ref(), Interrupted::Leaves, work)?.0)
+}
+
+/// Whether a file is a calibration and no experiment.
+#[pyfunction]
+pub fn is_calibration(path: PathBuf) -> bool {
+    calibration::is_calibration(&path)
+}
+
+/// Diagnoses the gap in pose of a calibration.
+#[pyfunction]
+#[pyo3(signature = (path, *, next, seed))]
+pub fn diagnose_poses(py: Python<'_>, path: PathBuf, next: bool, seed: u64) -> PyResult<Report> {
+    simply(py, move |_| {
+        let begin = Instant::now();
+        let (input, opened) = calibration::read(&path)?;
+        let found = gap::diagnose(&input, &opened, gap::Ask { next, seed })?;
+        let json = pretty(&gap::json::json(&found, begin.elapsed().as_secs_f64()));
+        let postures = found
+            .next
+            .as_ref()
+            .map(|n| ("next.csv".to_string(), n.csv()));
+        Ok(Report {
+            json,
+            warnings: found.warnings.clone(),
+            files: postures.into_iter().collect(),
+            page: Arc::new(move || gap::page::html(&found)),
+            scene: None,
+        })
+    })
 }
 
 /// Calibrates the geometry.

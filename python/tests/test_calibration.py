@@ -68,3 +68,53 @@ def test_bad_measurements():
     ]:
         with pytest.raises(excite.Error, match=words):
             excite.calibrate(robot=robot, frame="c", measurements=[m])
+
+
+def saved(folder, q, seen):
+    (folder / "three.urdf").write_text(URDF)
+    lines = ["q1,q2,q3,x,y,z,use"]
+    for k, row in enumerate(np.hstack([q, seen])):
+        lines.append(",".join(map(repr, map(float, row))) + (",fit" if k % 3 else ",holdout"))
+    (folder / "seen.csv").write_text("\n".join(lines) + "\n")
+    path = folder / "calibration.toml"
+    path.write_text(
+        'robot = "three.urdf"\nframe = "c"\n[[measurement]]\nkind = "position"\nfile = "seen.csv"\nstd = 2e-5\n'
+    )
+    return path
+
+
+def test_diagnosis_of_poses(tmp_path):
+    rng = np.random.default_rng(2)
+    q = rng.uniform(-1.2, 1.2, (90, 3))
+    # an encoder whose disc sits off its middle
+    off = q + np.stack([np.zeros(90), 6e-4 * np.sin(q[:, 1] + 0.5), np.zeros(90)], axis=1)
+    seen = point(off, 0.4) @ rotation((0, 0, 1), 0.4).T + np.array([1.0, 0.2, 0.1])
+    path = saved(tmp_path, q, seen + 2e-5 * rng.standard_normal(seen.shape))
+    found = excite.diagnose(path, next=False)
+    assert isinstance(found, excite.PoseDiagnosis) and found.verdict == "explained"
+    assert [(c["effect"], c["places"]) for c in found.claims] == [("encoder_eccentricity", ["j2"])]
+    assert found.holdout_shrink > 0.9 and found.outliers == [] and found.postures is None and found.next is None
+    assert "encoder_eccentricity (j2)" in repr(found) and len(found.to_frame()) >= 1
+    with pytest.raises(excite.Error, match="calibrate"):
+        found.robot
+    found.save(tmp_path / "out")
+    assert excite.PoseDiagnosis.read(tmp_path / "out").verdict == "explained"
+    # the same rows, calibrated from the file
+    assert excite.calibrate(path).holdout["after"]["mean"] < 5e-4
+
+
+def test_a_loop_of_two_arms():
+    rng = np.random.default_rng(3)
+    two = URDF.replace("</robot>", """<link name="d"/><link name="e"/>
+<joint name="k1" type="revolute"><parent link="base"/><child link="d"/><origin xyz="0.5 0 0.3"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="50"/></joint>
+<joint name="k2" type="revolute"><parent link="d"/><child link="e"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="50"/></joint></robot>""")
+    robot = excite.Robot.from_urdf(two)
+    q = rng.uniform(-1, 1, (20, 5))
+    found = excite.calibrate(
+        robot=robot, frame="c", other="e", measurements=[{"kind": "loop", "q": q, "std": 1.0, "angle_std": 1.0}], effects=[]
+    )
+    assert found.to_dict()["joints"] == ["j1", "j2", "j3", "k1", "k2"]
+    with pytest.raises(excite.Error, match="other"):
+        excite.calibrate(robot=robot, frame="c", measurements=[{"kind": "loop", "q": q}])

@@ -97,6 +97,11 @@ impl<'a> Bench<'a> {
         self.torques.as_deref()
     }
 
+    /// How links bend under gravity, by row; `None` where no inertia is known.
+    pub fn bends(&self) -> Option<&Bends> {
+        self.bends.as_ref()
+    }
+
     /// The plan of a first fit: rows for the fit count, no unknown of the robot is free.
     pub fn plan(&self, nominal: &Model) -> Plan {
         Plan {

@@ -174,13 +174,13 @@ mod tests {
             .map(|k| 1e-3 * ((k * k) as f64).sin())
             .chain(all.iter().map(|f| f.unknown.prior))
             .collect();
-        let at = arm.pose(&q, &x, &all, &rates);
+        let at = arm.pose(0, &q, &x, &all, &rates);
         for (k, f) in all.iter().enumerate() {
             let h = 1e-3 * f.unknown.prior;
             let shifted = |d: f64| {
                 let mut x = x.clone();
                 x[n + k] += d;
-                arm.pose(&q, &x, &all, &rates).frame.p
+                arm.pose(0, &q, &x, &all, &rates).frame.p
             };
             let slope = (shifted(h) - shifted(-h)) / (2.0 * h);
             let exact = at.jacobian.fixed_view::<3, 1>(0, n + k);

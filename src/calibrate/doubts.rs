@@ -110,7 +110,7 @@ pub(super) fn unreached(
             format!("{file}, line {}", row.line),
             format!(
                 "{} of {} rows have joint readings that no pose of the robot gives: are they in rad and m, in the \
-                 order of the joints, and from zero where the file has it?",
+                 order of the joints, from zero where the file has it, and is this the assembly mode of the robot?",
                 lost.len(),
                 poses.len()
             ),
@@ -126,6 +126,34 @@ pub(super) fn unreached(
             row.line
         ),
     ));
+    Ok(())
+}
+
+/// Errors that stay in the middle of the rows of a file, m, from which on nothing was identified.
+const HOPELESS: f64 = 0.05;
+
+/// Rows that no geometry near that of the file explains are an error: what would be written is no robot.
+pub(super) fn hopeless(input: &Calibration, after: &Errors) -> Result<()> {
+    for (m, measured) in input.measurements.iter().enumerate() {
+        let rows = input.rows.iter().zip(&after.robust);
+        let own: Vec<f64> = rows
+            .filter(|(r, _)| r.measurement == m && r.fit)
+            .map(|(_, e)| *e)
+            .collect();
+        let typical = crate::median::median(own.iter().copied());
+        if typical > HOPELESS {
+            return Err(Error::file(
+                &input.path,
+                measured.file.clone(),
+                format!(
+                    "no geometry near that of the robot file explains these rows: {} mm are left in the middle of them. Are the \
+                     joint readings in rad and in the order of the joints, is a target or an axis mirrored, and is this the robot, \
+                     its assembly mode, and the frame?",
+                    number((1e3 * typical).round())
+                ),
+            ));
+        }
+    }
     Ok(())
 }
 

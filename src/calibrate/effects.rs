@@ -3,11 +3,11 @@
 //! place of the reading `q`.
 
 use super::feature::{Feature, Rate, Shape};
-use super::serial::Link;
+use super::serial::Arm;
 use super::unknown::{Part, Unknown};
 use crate::dynamics::{Samples, Tree, Workspace};
 use crate::robot::{Inertia, Motion, Robot};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 /// Change of the joint's position under gravity that is expected of the joint that bears most, rad.
 pub(super) const SAG: f64 = 3e-3;
@@ -70,10 +70,12 @@ impl Gravity {
 }
 
 /// The same robot with even rods of 1 kg/m between its joints, for a file that states no masses.
-pub fn rods(robot: &Robot, links: &[Link], tip: &Vector3<f64>) -> Robot {
+pub fn rods(robot: &Robot, arm: &Arm) -> Robot {
     let mut robot = robot.clone();
-    for (i, link) in links.iter().enumerate() {
-        let end = links.get(i + 1).map_or(*tip, |next| next.body.position);
+    for (i, link) in arm.links.iter().enumerate() {
+        let next = arm.links.iter().find(|l| l.parent == Some(i));
+        let tip = arm.ends.iter().find(|e| e.link == i).map(|e| e.tip.p);
+        let end = next.map(|l| l.body.position).or(tip).unwrap_or_default();
         if let Some(body) = robot.bodies.iter_mut().find(|b| b.name == link.body.name) {
             body.inertia = Inertia::from_com(end.norm(), end * 0.5, Matrix3::zeros());
         }

@@ -1,7 +1,8 @@
 //! `calibration.toml`.
 
-use super::kind::{Held, Kind, Purpose};
-use super::pixels::{Camera, Optics};
+use super::entry::Entry;
+use super::frame::Frame;
+use super::kind::Kind;
 use super::rows::{self, Row, Source};
 use crate::error::{Error, Result, Warning};
 use serde::Deserialize;
@@ -21,6 +22,8 @@ pub struct Measurement {
     pub std: [f64; 2],
     /// camera or tracker, by name; measurements of one name share it and its target
     pub instrument: String,
+    /// the second arm's frame in that of the first where it is known, and its standard deviations (m, rad); of a loop
+    pub grip: Option<(Frame, [f64; 2])>,
 }
 
 /// A known distance between the points of two files.
@@ -68,6 +71,8 @@ pub struct Calibration {
     pub robot: String,
     /// the frame that the measurement sees
     pub frame: Option<String>,
+    /// the second arm's frame; of a loop
+    pub other: Option<String>,
     /// robot whose inertia tells the torques of gravity
     pub gravity: Option<String>,
     /// effects of the joints that are to be identified; `None`: those that the data bear out
@@ -91,6 +96,7 @@ pub struct Calibration {
 struct File {
     robot: String,
     frame: Option<String>,
+    other: Option<Spanned<String>>,
     gravity: Option<String>,
     effects: Option<Spanned<Vec<String>>>,
     poses: Option<String>,
@@ -102,24 +108,6 @@ struct File {
     distance: Vec<Spanned<DistanceEntry>>,
     prior: Option<Spanned<Tolerances>>,
 }
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Entry {
-    kind: Held,
-    file: String,
-    group: Option<String>,
-    #[serde(rename = "use")]
-    purpose: Option<Purpose>,
-    std: Option<f64>,
-    angle_std: Option<f64>,
-    instrument: Option<String>,
-    camera: Option<Camera>,
-    target: Option<String>,
-}
-
-/// Noise of a coordinate in a picture where none is stated, pixels.
-const PIXEL_STD: f64 = 0.1;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -158,7 +146,7 @@ impl Calibration {
     /// Unknown or missing keys, files that cannot be read, rows that do not fit: each with file and line.
     pub fn read<K>(
         path: &Path,
-        open: impl FnOnce(&str, Option<&str>) -> Result<(K, Vec<String>)>,
+        open: impl FnOnce(&str, Option<&str>, Option<&str>) -> Result<(K, Vec<String>)>,
     ) -> Result<(Self, K)> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
         let place = |at: usize| {
@@ -171,7 +159,8 @@ impl Calibration {
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let robot = beside(folder, &file.robot);
-        let (kinematics, joints) = open(&robot, file.frame.as_deref())?;
+        let other = file.other.as_ref().map(|o| o.get_ref().as_str());
+        let (kinematics, joints) = open(&robot, file.frame.as_deref(), other)?;
         let positive = |x: f64, at: usize, what: &str, unit: &str| match x.is_finite() && x > 0.0 {
             true => Ok(x),
             false => Err(Error::file(
@@ -220,20 +209,7 @@ impl Calibration {
         let mut noise_stated = true;
         let mut entries: Vec<(usize, Entry)> = Vec::new();
         if let Some(poses) = &file.poses {
-            entries.push((
-                0,
-                Entry {
-                    kind: Held::Pose,
-                    file: poses.clone(),
-                    group: None,
-                    purpose: None,
-                    std: None,
-                    angle_std: None,
-                    instrument: None,
-                    camera: None,
-                    target: None,
-                },
-            ));
+            entries.push((0, Entry::poses(poses.clone())));
         }
         for e in file.measurement {
             entries.push((e.span().start, e.into_inner()));
@@ -263,9 +239,21 @@ impl Calibration {
                     ),
                 ));
             }
-            let kind = entry.kind.kind();
+            let kind = entry.kind();
+            if kind.is_loop() && other.is_none() {
+                return Err(Error::file(
+                    path,
+                    place(at),
+                    "kind = \"loop\" is of two arms of one robot file; write frame = \"LINK\" for the first and other = \"LINK\" \
+                     for the second above",
+                ));
+            }
+            let grip = entry.grip().map_err(|e| match e {
+                Error::Argument(what) => Error::file(path, place(at), what),
+                other => other,
+            })?;
             let [usual, usual_angle] = kind.noise();
-            let optics = optics(folder, &entry).map_err(|e| match e {
+            let optics = entry.optics(folder).map_err(|e| match e {
                 Error::Argument(what) => Error::file(path, place(at), what),
                 other => other,
             })?;
@@ -301,7 +289,17 @@ impl Calibration {
                 file: entry.file,
                 std: [std.unwrap_or(usual), angle.unwrap_or(usual_angle)],
                 instrument: entry.instrument.unwrap_or_else(|| instrument.into()),
+                grip,
             });
+        }
+        if let Some(o) = &file.other
+            && !measurements.iter().any(|m| m.kind.is_loop())
+        {
+            return Err(Error::file(
+                path,
+                place(o.span().start),
+                "other is the second arm of a [[measurement]] with kind = \"loop\", and there is none",
+            ));
         }
         let mut distances = Vec::new();
         for d in &file.distance {
@@ -336,6 +334,7 @@ impl Calibration {
             path: path.to_path_buf(),
             robot,
             frame: file.frame,
+            other: file.other.map(Spanned::into_inner),
             gravity: file.gravity.map(|g| beside(folder, &g)),
             effects: file.effects.map(Spanned::into_inner),
             measurements,
@@ -364,45 +363,6 @@ impl Calibration {
         let name = &self.measurements[row.measurement].group;
         self.groups().iter().position(|g| g == name).unwrap_or(0)
     }
-}
-
-/// Camera and target of a measurement of kind "pixels"; `None` for the others.
-fn optics(folder: &Path, entry: &Entry) -> Result<Option<Optics>> {
-    let wrong = |what: String| Err(Error::Argument(what));
-    if entry.kind != Held::Pixels {
-        return match (&entry.camera, &entry.target) {
-            (None, None) => Ok(None),
-            _ => wrong("camera and target are for kind = \"pixels\"".into()),
-        };
-    }
-    let (Some(camera), Some(target)) = (entry.camera, &entry.target) else {
-        return wrong(
-            "kind = \"pixels\" needs camera = { fx = …, fy = …, cx = …, cy = … } in pixels and target = \"target.csv\" with the \
-             points of the target, x, y, z in m"
-                .into(),
-        );
-    };
-    let distortion = [camera.k1, camera.k2, camera.p1, camera.p2, camera.k3];
-    let all = [camera.cx, camera.cy].into_iter().chain(distortion);
-    let able =
-        camera.fx > 0.0 && camera.fy > 0.0 && all.chain([camera.fx, camera.fy]).all(f64::is_finite);
-    if !able {
-        return wrong("camera: fx and fy must be positive, and all numbers finite".into());
-    }
-    let std = entry.std.unwrap_or(PIXEL_STD);
-    if !(std.is_finite() && std > 0.0) {
-        return wrong(format!("std is {std}; it must be positive, in pixels"));
-    }
-    if entry.angle_std.is_some() {
-        return wrong(
-            "kind = \"pixels\" has no angle_std; std is that of a coordinate, in pixels".into(),
-        );
-    }
-    Ok(Some(Optics {
-        camera,
-        points: Optics::points(&folder.join(target))?,
-        std,
-    }))
 }
 
 /// A file beside another one, or the name of a bundled robot.

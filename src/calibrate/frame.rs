@@ -82,6 +82,14 @@ impl Frame {
         }
     }
 
+    /// By position (m) and roll, pitch, yaw (rad).
+    pub fn at(p: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Self {
+        Frame {
+            r: *Rotation3::from_euler_angles(roll, pitch, yaw).matrix(),
+            p: p.into(),
+        }
+    }
+
     /// A small displacement: shift by the first three numbers, then turn by the rotation vector of the last.
     pub fn small(x: &[f64]) -> Self {
         Frame {

@@ -59,7 +59,7 @@ pub(super) fn gravity(
         "its file states no inertia; torques of gravity are those of even rods of 1 kg/m between its joints. What is \
          said of joint compliance holds in kind, its values do not. Name a robot with masses by gravity = \"robot.toml\"",
     ));
-    let rods = effects::rods(opened.plant.robot(), &arm.links, &arm.tip.p);
+    let rods = effects::rods(opened.plant.robot(), arm);
     Ok(Gravity::of(
         rods,
         &opened.joints,

@@ -168,7 +168,7 @@ fn rank(s: &[f64]) -> usize {
 fn order(part: Part) -> usize {
     match part {
         Part::Camera => 0,
-        Part::Target => 1,
+        Part::Target | Part::Grip => 1,
         Part::Socket | Part::Plane => 2,
         _ => 3,
     }

@@ -45,7 +45,7 @@ impl Stats {
 #[non_exhaustive]
 pub struct Errors {
     /// m: distance of a point from the mean of its socket, of a target from where it was seen, of a point from its
-    /// plane
+    /// plane, of a second arm from where the first one holds it
     pub distance: Vec<f64>,
     /// rad; `None` where no orientation was measured
     pub angle: Vec<Option<f64>>,
@@ -79,6 +79,15 @@ pub fn errors(model: &Model, x: &[f64]) -> Errors {
                 for (i, p) in at {
                     out.distance[i] = (p - mean).norm();
                     out.robust[i] = (p - centre).norm();
+                }
+            }
+            Kind::Loop | Kind::Ball => {
+                for i in own {
+                    if let Some((gap, turn)) = model.misclosure(i, x) {
+                        out.distance[i] = gap;
+                        out.robust[i] = gap;
+                        out.angle[i] = turn;
+                    }
                 }
             }
             Kind::Plane | Kind::Gauge => {
@@ -142,6 +151,16 @@ pub struct Group {
     pub noise: f64,
 }
 
+/// Standard deviation of a row's position in one direction, as the fit takes it, m.
+fn stated(model: &Model, row: usize) -> f64 {
+    let r = &model.input.rows[row];
+    let std = match r.covariance {
+        Some(c) => ((c[(0, 0)] + c[(1, 1)] + c[(2, 2)]) / 3.0).sqrt(),
+        None => model.input.measurements[r.measurement].std[0],
+    };
+    std * model.noise
+}
+
 /// Groups, and the rows that do not belong to theirs.
 pub fn strays(model: &Model, errors: &Errors) -> (Vec<Group>, Vec<usize>) {
     let input = model.input;
@@ -183,7 +202,8 @@ pub fn strays(model: &Model, errors: &Errors) -> (Vec<Group>, Vec<usize>) {
     let rows = (0..of.len())
         .filter(|&i| {
             let g = &groups[of[i]];
-            let scale = g.noise.max(usual);
+            // rows held out may be better than those that are fitted, and say nothing of their noise
+            let scale = g.noise.max(usual).max(stated(model, i));
             g.spoiled || !(errors.robust[i] <= outlier(dims(i)) * scale)
         })
         .collect();

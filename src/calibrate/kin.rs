@@ -58,8 +58,28 @@ impl Kin {
     /// Joint readings that no pose gives.
     pub fn nominal(&self, q: &[f64]) -> Result<Frame> {
         match self {
-            Kin::Arm(arm) => Ok(arm.pose(q, &vec![0.0; arm.errors()], &[], &[]).frame),
+            Kin::Arm(arm) => Ok(arm.pose(0, q, &vec![0.0; arm.errors()], &[], &[]).frame),
             Kin::Parallel(p) => p.nominal(q),
+        }
+    }
+
+    /// Nominal pose of the second arm's frame; `None` of robots that have none.
+    pub fn nominal_other(&self, q: &[f64]) -> Option<Frame> {
+        let none = vec![0.0; self.errors()];
+        Some(self.other(q, &none, &[], &[])?.frame)
+    }
+
+    /// Pose and Jacobian of the second arm's frame; `None` of robots that have none.
+    pub fn other(
+        &self,
+        q: &[f64],
+        x: &[f64],
+        features: &[Feature],
+        rate: &[Rate],
+    ) -> Option<Posed> {
+        match self {
+            Kin::Arm(arm) if arm.ends.len() > 1 => Some(arm.pose(1, q, x, features, rate)),
+            _ => None,
         }
     }
 
@@ -76,7 +96,7 @@ impl Kin {
         near: Option<&Frame>,
     ) -> Result<Posed> {
         match self {
-            Kin::Arm(arm) => Ok(arm.pose(q, x, features, rate)),
+            Kin::Arm(arm) => Ok(arm.pose(0, q, x, features, rate)),
             Kin::Parallel(p) => match near {
                 Some(near) => p.pose(q, x, features, rate, near),
                 None => p.pose(q, x, features, rate, &p.nominal(q)?),

@@ -16,6 +16,10 @@ pub enum Kind {
     Plane,
     /// a dial gauge reads the distance of the frame's origin from a fixed plane
     Gauge,
+    /// a second arm holds what the first one holds: its frame does not move in that of the first
+    Loop,
+    /// a ball joint between two arms: a point of one frame stays in a point of the other
+    Ball,
 }
 
 impl Kind {
@@ -27,6 +31,7 @@ impl Kind {
             Kind::Point => "point",
             Kind::Plane => "plane",
             Kind::Gauge => "gauge",
+            Kind::Loop | Kind::Ball => "loop",
         }
     }
 
@@ -36,7 +41,7 @@ impl Kind {
             Kind::Pose => &["x", "y", "z", "qw", "qx", "qy", "qz"],
             Kind::Position => &["x", "y", "z"],
             Kind::Gauge => &["reading"],
-            Kind::Point | Kind::Plane => &[],
+            Kind::Point | Kind::Plane | Kind::Loop | Kind::Ball => &[],
         }
     }
 
@@ -45,7 +50,8 @@ impl Kind {
         match self {
             Kind::Pose => [3e-4, 3.5e-4],
             Kind::Position => [5e-5, f64::NAN],
-            Kind::Point => [2e-4, f64::NAN],
+            Kind::Loop => [2e-4, 5e-4],
+            Kind::Point | Kind::Ball => [2e-4, f64::NAN],
             Kind::Plane | Kind::Gauge => [5e-5, f64::NAN],
         }
     }
@@ -53,6 +59,11 @@ impl Kind {
     /// Whether a row of it is one number, along a normal.
     pub(super) fn is_line(self) -> bool {
         matches!(self, Kind::Plane | Kind::Gauge)
+    }
+
+    /// Whether it is of two arms.
+    pub fn is_loop(self) -> bool {
+        matches!(self, Kind::Loop | Kind::Ball)
     }
 
     /// Whether poses of its instrument are unknown.
@@ -77,6 +88,8 @@ pub enum Held {
     Plane,
     /// readings of a gauge
     Gauge,
+    /// postures of two arms that hold the same thing
+    Loop,
 }
 
 impl Held {
@@ -88,6 +101,7 @@ impl Held {
             Held::Point => Kind::Point,
             Held::Plane => Kind::Plane,
             Held::Gauge => Kind::Gauge,
+            Held::Loop => Kind::Loop,
         }
     }
 }

@@ -13,7 +13,7 @@ pub struct Layout {
     pub camera: Vec<Option<usize>>,
     /// of the target: six numbers, three for a tracker
     pub target: Vec<Option<usize>>,
-    /// three numbers of the point or plane
+    /// three numbers of the point or plane; six of what two arms hold
     pub contact: Vec<Option<usize>>,
 }
 
@@ -28,9 +28,32 @@ pub struct Start {
     pub socket: Vec<Vector3<f64>>,
     /// unit normal, and distance of the plane along it
     pub plane: Vec<(Vector3<f64>, f64)>,
+    /// the second arm's frame in that of the first; of a ball joint its place in the first
+    pub grip: Vec<Frame>,
+    /// place of a ball joint in the second frame, m
+    pub ball: Vec<Vector3<f64>>,
+}
+
+impl Start {
+    /// Nothing is known of so many measurements.
+    pub fn none(count: usize) -> Self {
+        Start {
+            camera: vec![Frame::identity(); count],
+            target: vec![Frame::identity(); count],
+            socket: vec![Vector3::zeros(); count],
+            plane: vec![(Vector3::z(), 0.0); count],
+            grip: vec![Frame::identity(); count],
+            ball: vec![Vector3::zeros(); count],
+        }
+    }
 }
 
 impl Layout {
+    /// Number of unknowns of a contact of this kind.
+    pub fn width(kind: Kind) -> usize {
+        if kind.is_loop() { 6 } else { 3 }
+    }
+
     /// The unknowns of the set-up of all measurements, behind those that there are.
     pub fn new(input: &Calibration, unknowns: &mut Vec<Unknown>) -> Self {
         let mut layout = Layout::default();
@@ -72,6 +95,25 @@ impl Layout {
                                 Part::Socket,
                                 f64::INFINITY,
                             )
+                        });
+                    }
+                }
+                (Kind::Loop, _) => {
+                    contact = Some(unknowns.len());
+                    let [length, angle] = match measured.grip {
+                        Some((_, std)) => std,
+                        None => [f64::INFINITY; 2],
+                    };
+                    let frame = Unknown::frame(&measured.file, Part::Grip, [length, angle]);
+                    unknowns.extend(frame.into_iter().map(|u| Unknown { scale: 0.01, ..u }));
+                }
+                (Kind::Ball, _) => {
+                    contact = Some(unknowns.len());
+                    for n in ["x", "y", "z", "other_x", "other_y", "other_z"] {
+                        let name = format!("{}.{n}", measured.file);
+                        unknowns.push(Unknown {
+                            scale: 0.01,
+                            ..Unknown::new(name, "m", Part::Grip, f64::INFINITY)
                         });
                     }
                 }

@@ -1,5 +1,5 @@
-//! Kinematic calibration: the geometry of a robot from joint readings and what a camera, a tracker, a socket, a plane
-//! or a gauge says of its tool.
+//! Kinematic calibration: the geometry of a robot from joint readings and what a camera, a tracker, a socket, a plane,
+//! a gauge or a second arm says of its tool.
 //!
 //! ```text
 //! minimise over x   Σ ρ(|Σ_r^(−1/2) r(q, y; x)|)  +  |P^(−1/2) x|²
@@ -13,8 +13,10 @@ mod actuators_at;
 mod bench;
 mod bend;
 mod cells;
+mod closed;
 mod doubts;
 mod effects;
+mod entry;
 mod feature;
 mod file;
 mod fit;
@@ -47,6 +49,8 @@ mod serial;
 mod start;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_closed;
 mod unknown;
 #[doc(hidden)]
 pub mod write;
@@ -58,7 +62,7 @@ pub use identifiable::{Confounded, Identifiability};
 pub use judge::{Errors, Stats};
 pub use kind::Kind;
 pub use model::{Algorithm, Settings};
-pub use open::{Opened, open};
+pub use open::{Opened, open, open_pair};
 pub use result::{Calibrated, DistanceResult, GroupResult, Identified, Outlier, RowResult};
 pub use select::Trial;
 pub use unknown::{Part, Unknown};
@@ -72,8 +76,11 @@ use std::path::Path;
 /// # Errors
 /// As [`Calibration::read`] and [`open()`].
 pub fn read(path: impl AsRef<Path>) -> Result<(Calibration, Opened)> {
-    Calibration::read(path.as_ref(), |robot, frame| {
-        let opened = open(robot, frame)?;
+    Calibration::read(path.as_ref(), |robot, frame, other| {
+        let opened = match other {
+            None => open(robot, frame)?,
+            Some(other) => open_pair(robot, frame, other)?,
+        };
         let joints = opened.joints.clone();
         Ok((opened, joints))
     })
@@ -106,6 +113,7 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     doubts::unsettled(&fit, &mut warnings);
     let x = robust::set_up_rest(&model, &plan, &fit.x)?;
     let after = judge::errors(&model, &x);
+    doubts::hopeless(input, &after)?;
     let (groups, strays) = judge::strays(&model, &after);
     let covariance = fit::covariance(&model, &plan, &x);
     doubts::uncertain(covariance.as_ref(), &mut warnings);

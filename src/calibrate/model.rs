@@ -8,6 +8,7 @@
 //! | position | `p(T_cb T_be T_et) − p_meas` |
 //! | point | `p_be − c`, `c` unknown |
 //! | plane, gauge | `nᵀ p_be − d − reading`, `n, d` unknown |
+//! | loop | `p_b − (p_a + R_a p_z)`, `log(R_a R_z R_bᵀ)` (`closed`) |
 //! | distance | `|c_1 − c_2| − value` |
 
 use super::effects;
@@ -162,7 +163,8 @@ impl<'a> Model<'a> {
                 Some(p) => p.actuators(),
                 None => 6,
             },
-            Kind::Position | Kind::Point => 3,
+            Kind::Loop => 6,
+            Kind::Position | Kind::Point | Kind::Ball => 3,
             Kind::Plane | Kind::Gauge => 1,
         }
     }
@@ -285,6 +287,12 @@ impl<'a> Model<'a> {
     pub fn block(&self, row: usize, x: &[f64]) -> Option<Block> {
         if let (Some(p), Value::Pose(pose)) = (self.by_actuators(), &self.input.rows[row].value) {
             return self.actuator_block(p, row, x, pose);
+        }
+        if self.input.measurements[self.input.rows[row].measurement]
+            .kind
+            .is_loop()
+        {
+            return self.loop_block(row, x);
         }
         let posed = self.posed(row, x).ok()?;
         let data = &self.input.rows[row];

@@ -4,6 +4,7 @@ use super::fit::{self, Fit, Plan};
 use super::judge;
 use super::kin::Kin;
 use super::kind::Kind;
+use super::layout::Layout;
 use super::model::{Algorithm, Model};
 use super::unknown::Part;
 use crate::error::Result;
@@ -39,7 +40,7 @@ fn own(model: &Model, m: usize, mut each: impl FnMut(usize)) {
         .for_each(&mut each);
     l.contact[m]
         .into_iter()
-        .flat_map(|c| c..c + 3)
+        .flat_map(|c| c..c + Layout::width(model.input.measurements[m].kind))
         .for_each(&mut each);
 }
 

@@ -188,7 +188,7 @@ impl<'a> Cells<'a> {
 
     fn value(&self, v: &[f64], solved: Option<Solved>, tally: &mut Tally) -> Result<Value> {
         Ok(match (self.source.kind, solved) {
-            (Kind::Point | Kind::Plane, _) => Value::Contact,
+            (Kind::Point | Kind::Plane | Kind::Loop | Kind::Ball, _) => Value::Contact,
             (Kind::Gauge, _) => Value::Reading(v[0]),
             (Kind::Position, _) => Value::Position(Vector3::new(v[0], v[1], v[2])),
             (Kind::Pose, Some(s)) => Value::Pose(s.pose),

@@ -1,4 +1,5 @@
-//! Serial robots and trees: the chain from the base to the frame that the measurement sees.
+//! Serial robots and trees: the chain from the base to the frame that the measurement sees, and to that of a second
+//! arm where there is one. Joints that both chains have in common are there once.
 //!
 //! Joint `i` sits in the frame before at `X_i E_i M_i(q)`: `X_i` as in the robot file, `E_i` six small errors
 //! (a shift in the axes of `X_i`, then a rotation vector), `M_i` the motion of the joint. Behind the last joint
@@ -20,17 +21,28 @@ pub struct Link {
     pub body: Body,
     /// index of its coordinate among those that are measured
     pub coordinate: usize,
+    /// index of the joint before it in the list; `None` on the base
+    pub parent: Option<usize>,
 }
 
-/// A chain of joints.
+/// A frame that is measured.
+#[derive(Debug, Clone)]
+pub struct End {
+    /// index of the joint that carries it
+    pub link: usize,
+    /// the frame on the body of that joint
+    pub tip: Frame,
+    /// name of the fixed joint whose errors are identified; `None` where the frame is the body's own
+    pub tip_joint: Option<String>,
+}
+
+/// A chain of joints, or two that hold the same thing.
 #[derive(Debug, Clone)]
 pub struct Arm {
-    /// joints from the base to the tip
+    /// joints, each behind the one that carries it
     pub links: Vec<Link>,
-    /// the frame on the last body
-    pub tip: Frame,
-    /// name of the fixed joint whose errors are identified; `None` where the frame is the last body's
-    pub tip_joint: Option<String>,
+    /// the frame, and that of the second arm
+    pub ends: Vec<End>,
 }
 
 /// Pose of a frame, and by how much it moves with each unknown of the robot: position and rotation in base
@@ -52,35 +64,66 @@ impl Arm {
             .collect()
     }
 
+    /// Names of all joints that have six errors, in their order: those that move, then the fixed ones of the tips.
+    pub fn places(&self) -> Vec<&str> {
+        let tips = self.ends.iter().filter_map(|e| e.tip_joint.as_deref());
+        self.names().into_iter().chain(tips).collect()
+    }
+
+    /// Indices of the joints that lead to a frame, from the base.
+    fn chain(&self, end: usize) -> Vec<usize> {
+        let mut all = vec![self.ends[end].link];
+        while let Some(parent) = self.links[all[all.len() - 1]].parent {
+            all.push(parent);
+        }
+        all.reverse();
+        all
+    }
+
+    /// Index of the six errors of the fixed joint of a frame.
+    fn tip_place(&self, end: usize) -> Option<usize> {
+        self.ends[end].tip_joint.as_ref()?;
+        let before = self.ends[..end].iter().filter(|e| e.tip_joint.is_some());
+        Some(self.links.len() + before.count())
+    }
+
     /// Number of geometric unknowns.
     pub fn errors(&self) -> usize {
-        6 * (self.links.len() + usize::from(self.tip_joint.is_some()))
+        let tips = self.ends.iter().filter(|e| e.tip_joint.is_some());
+        6 * (self.links.len() + tips.count())
     }
 
     /// The geometric unknowns.
     pub fn unknowns(&self, tolerance: [f64; 2]) -> Vec<Unknown> {
-        let names = self.links.iter().map(|l| l.body.joint_name.as_str());
-        names
-            .chain(self.tip_joint.as_deref())
+        self.places()
+            .into_iter()
             .flat_map(|n| Unknown::frame(n, Part::Geometry, tolerance))
             .collect()
     }
 
-    /// Shift of the frame's origin by each joint, `3 × joints`, at the errors `x` of the geometry.
-    pub fn by_joints(&self, q: &[f64], x: &[f64]) -> DMatrix<f64> {
+    /// Pose of a frame, and its shift and turn by each joint, `6 × joints` in base axes, at the errors `x` of the
+    /// geometry.
+    pub fn by_joints(&self, end: usize, q: &[f64], x: &[f64]) -> Posed {
         let features: Vec<Feature> = (0..q.len()).map(Feature::turn).collect();
         let ones = vec![Rate::turn(1.0); q.len()];
         let all: Vec<f64> = x.iter().copied().chain(ones.iter().map(|_| 0.0)).collect();
-        let posed = self.pose(q, &all, &features, &ones);
-        posed
-            .jacobian
-            .view((0, self.errors()), (3, q.len()))
-            .into_owned()
+        let posed = self.pose(end, q, &all, &features, &ones);
+        Posed {
+            frame: posed.frame,
+            jacobian: posed.jacobian.columns(self.errors(), q.len()).into_owned(),
+        }
     }
 
-    /// Pose at joint readings `q`, with errors `x` (geometry, then one number a feature). `rate` holds the value of
+    /// Pose of a frame at joint readings `q`, with errors `x` (geometry, then one number a feature). `rate` holds the value of
     /// each feature in this posture: the change of its joint per unit.
-    pub fn pose(&self, q: &[f64], x: &[f64], features: &[Feature], rate: &[Rate]) -> Posed {
+    pub fn pose(
+        &self,
+        end: usize,
+        q: &[f64],
+        x: &[f64],
+        features: &[Feature],
+        rate: &[Rate],
+    ) -> Posed {
         let n = self.errors();
         let mut j = DMatrix::zeros(6, n + features.len());
         let mut at = Frame::identity();
@@ -96,7 +139,8 @@ impl Arm {
         // axis and origin of each joint, and of the frames of the errors
         let mut joints = Vec::with_capacity(self.links.len());
         let mut places = Vec::with_capacity(self.links.len() + 1);
-        for (i, link) in self.links.iter().enumerate() {
+        for i in self.chain(end) {
+            let link = &self.links[i];
             let b = &link.body;
             at = at.then(&Frame {
                 r: b.rotation,
@@ -123,9 +167,8 @@ impl Arm {
             };
             at = at.then(&motion);
         }
-        at = at.then(&self.tip);
-        if self.tip_joint.is_some() {
-            let i = self.links.len();
+        at = at.then(&self.ends[end].tip);
+        if let Some(i) = self.tip_place(end) {
             places.push((i, at));
             at = at.then(&Frame::small(&x[6 * i..6 * i + 6]));
         }

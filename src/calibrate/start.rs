@@ -213,6 +213,20 @@ fn explanations(pairs: &[Pair], degrees: Option<Vec<Frame>>) -> Vec<(&'static st
             }),
         ));
         all.push((
+            "the positions are mirrored; turn one of the camera's axes about",
+            map(&|p| Pair {
+                seen: s * p.seen,
+                ..*p
+            }),
+        ));
+        all.push((
+            "the orientations are mirrored: a target, or its points, that is the mirror image of the real one",
+            map(&|p| Pair {
+                turned: p.turned.map(|r| s * r * s),
+                ..*p
+            }),
+        ));
+        all.push((
             "the axes of the target are mirrored; print it again, or turn one of its axes about",
             map(&|p| Pair {
                 turned: p.turned.map(|r| r * s),
@@ -236,12 +250,7 @@ fn explanations(pairs: &[Pair], degrees: Option<Vec<Frame>>) -> Vec<(&'static st
 /// Too few rows, and poses that no camera and target can explain: with what the file seems to mean.
 pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<Start> {
     let count = input.measurements.len();
-    let mut start = Start {
-        camera: vec![Frame::identity(); count],
-        target: vec![Frame::identity(); count],
-        socket: vec![Vector3::zeros(); count],
-        plane: vec![(Vector3::z(), 0.0); count],
-    };
+    let mut start = Start::none(count);
     for m in 0..count {
         let measured = &input.measurements[m];
         let same = |o: usize| {
@@ -312,6 +321,10 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
             }
             start.camera[m] = found.camera;
             start.target[m] = found.target;
+            continue;
+        }
+        if measured.kind.is_loop() {
+            (start.grip[m], start.ball[m]) = super::closed::start(input, kin, m, poses);
             continue;
         }
         let own: Vec<(Vector3<f64>, f64)> = input

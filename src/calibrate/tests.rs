@@ -18,7 +18,7 @@ fn random(r: &mut ChaCha8Rng, s: f64) -> Vector3<f64> {
 }
 
 /// Nearly normal, of variance one.
-fn normal(r: &mut ChaCha8Rng) -> f64 {
+pub(super) fn normal(r: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| r.random_range(-0.5..0.5)).sum()
 }
 
@@ -44,21 +44,27 @@ fn postures(opened: &Opened, r: &mut ChaCha8Rng, count: usize) -> Vec<Vec<f64>> 
     all
 }
 
-fn measurement(kind: Kind, file: &str, group: &str, std: [f64; 2]) -> Measurement {
+pub(super) fn measurement(kind: Kind, file: &str, group: &str, std: [f64; 2]) -> Measurement {
     Measurement {
         kind,
         file: file.into(),
         group: group.into(),
         std,
         instrument: format!("{} instrument", kind.name()),
+        grip: None,
     }
 }
 
-fn input(measurements: Vec<Measurement>, rows: Vec<Row>, tolerance: [f64; 2]) -> Calibration {
+pub(super) fn input(
+    measurements: Vec<Measurement>,
+    rows: Vec<Row>,
+    tolerance: [f64; 2],
+) -> Calibration {
     Calibration {
         path: "calibration.toml".into(),
         robot: "robot".into(),
         frame: None,
+        other: None,
         gravity: None,
         effects: None,
         measurements,
@@ -74,7 +80,7 @@ fn input(measurements: Vec<Measurement>, rows: Vec<Row>, tolerance: [f64; 2]) ->
     }
 }
 
-fn row(measurement: usize, q: Vec<f64>, value: Value, fit: bool) -> Row {
+pub(super) fn row(measurement: usize, q: Vec<f64>, value: Value, fit: bool) -> Row {
     Row {
         measurement,
         line: 1,
@@ -109,15 +115,14 @@ fn mixed(opened: &Opened, r: &mut ChaCha8Rng) -> (Calibration, Start) {
     let mut c = input(all.to_vec(), rows, [0.002, 0.005]);
     c.distances.clear();
     let start = Start {
-        camera: vec![Frame::identity(); 4],
-        target: vec![Frame::identity(); 4],
         socket: vec![Vector3::new(0.1, 0.2, 0.3); 4],
         plane: vec![(Vector3::z(), 0.1); 4],
+        ..Start::none(4)
     };
     (c, start)
 }
 
-fn nominal(opened: &Opened, c: &Calibration) -> Vec<Option<Frame>> {
+pub(super) fn nominal(opened: &Opened, c: &Calibration) -> Vec<Option<Frame>> {
     c.rows
         .iter()
         .map(|r| opened.kin.nominal(&r.q).ok())
@@ -270,8 +275,7 @@ fn count(name: &str, rows: usize) -> Identifiability {
             r: exp(&Vector3::new(0.1, 0.2, 0.7)),
             p: Vector3::new(0.01, 0.02, -0.05),
         }],
-        socket: vec![Vector3::zeros()],
-        plane: vec![(Vector3::z(), 0.0)],
+        ..Start::none(1)
     };
     let settings = Settings {
         orientation: false,
@@ -551,6 +555,23 @@ fn mistaken_files_are_said_to_be_what_they_are() {
         })
     });
     assert!(said.contains("qw, qx, qy, qz"), "{said}");
+    let mirror = nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, 1.0));
+    let said = change(&|r| {
+        pose(r, &|p| Frame {
+            p: mirror * p.p,
+            ..p
+        })
+    });
+    assert!(said.contains("the positions are mirrored"), "{said}");
+    let said = change(&|r| {
+        pose(r, &|p| Frame {
+            r: mirror * p.r * mirror,
+            ..p
+        })
+    });
+    assert!(said.contains("the orientations are mirrored"), "{said}");
+    let said = change(&|r| r.q.swap(1, 2));
+    assert!(said.contains("no geometry near"), "{said}");
     let first = good.rows[0].q.clone();
     let mut same = made(
         &opened,
@@ -577,6 +598,7 @@ fn chosen_postures_know_more_than_random_ones() {
             count: 20,
             kind: Kind::Pose,
             points: Vec::new(),
+            grip: None,
             region: None,
             sight: None,
             std: [3e-4, 3.5e-4],

@@ -24,6 +24,8 @@ pub enum Part {
     Socket,
     /// plane that a frame's origin touches
     Plane,
+    /// how the second arm's frame sits in that of the first
+    Grip,
 }
 
 /// One unknown. Its value is the deviation from the start; see [`Unknown::prior`].

@@ -25,9 +25,9 @@ pub fn robot(opened: &Opened, x: &[f64]) -> Result<Vec<(&'static str, String)>> 
         Kin::Parallel(p) => return super::write_parallel::robot(p, opened, x),
     };
     let text = opened.urdf.as_deref().ok_or_else(none)?;
-    let names = arm.links.iter().map(|l| l.body.joint_name.as_str());
-    let changes: Vec<(&str, Frame)> = names
-        .chain(arm.tip_joint.as_deref())
+    let changes: Vec<(&str, Frame)> = arm
+        .places()
+        .into_iter()
         .enumerate()
         .map(|(i, n)| (n, Frame::small(&x[6 * i..6 * i + 6])))
         .collect();

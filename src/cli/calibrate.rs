@@ -78,6 +78,9 @@ pub fn run(args: Args) -> Result<()> {
     }
 }
 
+/// Outliers that the summary names; all are in `calibration.json`.
+const NAMED: usize = 6;
+
 fn summary(found: &Calibrated, files: &[PathBuf]) -> String {
     let mut out = String::new();
     let i = &found.identifiability;
@@ -119,6 +122,28 @@ fn summary(found: &Calibrated, files: &[PathBuf]) -> String {
                 }
             );
         }
+    }
+    if !found.outliers.is_empty() {
+        let named = found
+            .outliers
+            .iter()
+            .take(NAMED)
+            .map(|o| match o.note.as_str() {
+                "" => format!("{} line {}", o.file, o.line),
+                note => format!("{} line {} ({note})", o.file, o.line),
+            });
+        let _ = writeln!(
+            out,
+            "  {} of {} rows do not belong: {}{}",
+            found.outliers.len(),
+            found.rows.len(),
+            named.collect::<Vec<_>>().join(", "),
+            if found.outliers.len() > NAMED {
+                ", …"
+            } else {
+                ""
+            }
+        );
     }
     for t in &found.trials {
         let _ = writeln!(

@@ -2,7 +2,7 @@
 
 use super::{Collisions, Folder, pretty, print, warn};
 use clap::ValueEnum;
-use excite::calibrate::{self, Kind, Tolerances, poses};
+use excite::calibrate::{self, Frame, Kind, Tolerances, poses};
 use excite::{Error, Result};
 use nalgebra::Vector3;
 use std::path::PathBuf;
@@ -16,7 +16,8 @@ use std::path::PathBuf;
                   random ones.",
     after_help = "Examples:\n  excite poses ur5e --count 40\n  excite poses h4 --count 45 --std 0.0003 --angle-std \
                   0.00035 --rehearse 1\n  excite poses panda --kind point --point 0.5,0,0.1 --point 0.4,0.3,0.1\n  excite poses \
-                  ur5e --camera 0.5,0,1.6,0.5,0,0.3 --view 50 --range 0.5,2"
+                  ur5e --camera 0.5,0,1.6,0.5,0,0.3 --view 50 --range 0.5,2\n  excite poses two_arms.urdf --kind loop --frame left_tool --other \
+                  right_tool --grip 0,0,0.1,180,0,0"
 )]
 pub struct Args {
     /// Robot: a robot.toml, a URDF, or the name of a bundled one
@@ -36,6 +37,17 @@ pub struct Args {
     /// Link that the measurement sees [default: the last one]
     #[arg(long, value_name = "LINK")]
     frame: Option<String>,
+    /// Link of the second arm, for --kind loop
+    #[arg(long, value_name = "LINK")]
+    other: Option<String>,
+    /// Pose of that link in the frame while both hold the same thing, x,y,z,roll,pitch,yaw, m and degrees, for --kind loop
+    #[arg(
+        long,
+        value_name = "POSE",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    grip: Vec<f64>,
     /// Fixed point for the frame's origin, x,y,z in the base, m; may be given several times
     #[arg(
         long,
@@ -112,6 +124,7 @@ enum What {
     Pose,
     Position,
     Point,
+    Loop,
 }
 
 pub fn run(args: Args) -> Result<()> {
@@ -143,6 +156,7 @@ pub fn run(args: Args) -> Result<()> {
         What::Pose => Kind::Pose,
         What::Position => Kind::Position,
         What::Point => Kind::Point,
+        What::Loop => Kind::Loop,
     };
     if (kind == Kind::Point) == args.point.is_empty() {
         return Err(Error::Argument(
@@ -161,7 +175,11 @@ pub fn run(args: Args) -> Result<()> {
         _ => None,
     };
     let sight = sight(&args)?;
-    let mut opened = calibrate::open(&args.robot, args.frame.as_deref())?;
+    let grip = grip(&args)?;
+    let mut opened = match &args.other {
+        None => calibrate::open(&args.robot, args.frame.as_deref())?,
+        Some(other) => calibrate::open_pair(&args.robot, args.frame.as_deref(), other)?,
+    };
     opened.plant = args.collisions.apply(opened.plant);
     let request = poses::Request {
         count: args.count,
@@ -171,6 +189,7 @@ pub fn run(args: Args) -> Result<()> {
             .chunks(3)
             .map(Vector3::from_column_slice)
             .collect(),
+        grip,
         region,
         sight,
         std: [args.std, args.angle_std],
@@ -184,7 +203,7 @@ pub fn run(args: Args) -> Result<()> {
     };
     if args.rehearse.is_some() && kind == Kind::Point {
         return Err(Error::Argument(
-            "--rehearse is of poses and positions, not of points".into(),
+            "--rehearse is of poses, positions and loops, not of points".into(),
         ));
     }
     let all = [
@@ -208,7 +227,8 @@ pub fn run(args: Args) -> Result<()> {
             Ok(path) => path.to_string_lossy().into_owned(),
             Err(_) => args.robot.clone(),
         };
-        let text = poses::toml(&robot, args.frame.as_deref(), &request, all[3]);
+        let frames = [args.frame.as_deref(), args.other.as_deref()];
+        let text = poses::toml(&robot, frames, &request, all[3]);
         files.push(folder.write(all[3], &poses::rehearse(&opened, &request, &found, seed)?)?);
         files.push(folder.write(all[4], &text)?);
     }
@@ -223,6 +243,32 @@ pub fn run(args: Args) -> Result<()> {
         out += &format!("wrote {}\n", f.display());
     }
     print(&out)
+}
+
+/// How the second arm's frame sits in that of the first.
+fn grip(args: &Args) -> Result<Option<Frame>> {
+    let asked = matches!(args.kind, What::Loop);
+    if !asked {
+        return match (&args.other, args.grip.is_empty()) {
+            (None, true) => Ok(None),
+            _ => Err(Error::Argument(
+                "--other and --grip are for --kind loop".into(),
+            )),
+        };
+    }
+    match (&args.other, &args.frame, &args.grip[..]) {
+        (Some(_), Some(_), &[x, y, z, roll, pitch, yaw])
+            if args.grip.iter().all(|v| v.is_finite()) =>
+        {
+            let angles = [roll, pitch, yaw].map(f64::to_radians);
+            Ok(Some(Frame::at([x, y, z], angles)))
+        }
+        _ => Err(Error::Argument(
+            "--kind loop needs --frame LINK and --other LINK, the tools of both arms, and --grip X,Y,Z,ROLL,PITCH,YAW: the pose of \
+             the second in the first, m and degrees"
+                .into(),
+        )),
+    }
 }
 
 /// The camera that is asked for.

@@ -20,6 +20,8 @@ enum Withheld {
     Eccentricity(usize, f64),
     /// rad/(N m), m/N
     Compliance(usize, f64),
+    /// flexibility `1/(E I)` of the link behind a joint, 1/(N m²)
+    Bend(usize, f64),
     /// by the side that the joint comes from
     Play(usize, f64),
     /// by the side to which gravity pulls
@@ -69,6 +71,43 @@ fn forward(q: &[f64; 6], table: &[[f64; 3]; 6]) -> (Matrix4<f64>, Vec<Vector3<f6
         at *= shift(*a, 0.0, *d) * turn(0, *alpha);
     }
     (at, centres)
+}
+
+/// Tool of an arm one of whose links is a beam that bends under gravity: curvature summed up along it.
+fn bent(q: &[f64; 6], link: usize, flexible: f64) -> Matrix4<f64> {
+    const PIECES: usize = 400;
+    let (_, centres) = forward(q, &TABLE);
+    let point = |m: &Matrix4<f64>| -> Vector3<f64> { m.fixed_view::<3, 1>(0, 3).into() };
+    let mut at = Matrix4::<f64>::identity();
+    for (k, (q, [a, alpha, d])) in q.iter().zip(TABLE).enumerate() {
+        let root = point(&at);
+        at *= turn(2, *q) * shift(a, 0.0, d) * turn(0, alpha);
+        if k != link {
+            continue;
+        }
+        let (end, length) = (point(&at), (point(&at) - root).norm());
+        let along = (end - root) / length;
+        let pull = |m: f64| Vector3::new(0.0, 0.0, -9.81 * m);
+        let ds = length / PIECES as f64;
+        let (mut turned, mut moved) = (Vector3::zeros(), Vector3::zeros());
+        for piece in 0..PIECES {
+            let here = root + along * ((piece as f64 + 0.5) * ds);
+            let moment: Vector3<f64> = (link + 1..6)
+                .map(|b| (centres[b] - here).cross(&pull(MASS[b])))
+                .sum();
+            let twist = along * along.dot(&moment);
+            let before = turned;
+            // a round tube of steel twists 1.3 times as easily as it bends
+            turned += (moment + twist * 0.3) * (flexible * ds);
+            moved += (0.5 * (before + turned)).cross(&along) * ds;
+        }
+        let mut new = Matrix4::identity();
+        let rotation = Rotation3::new(turned).into_inner() * at.fixed_view::<3, 3>(0, 0);
+        new.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+        new.fixed_view_mut::<3, 1>(0, 3).copy_from(&(end + moved));
+        at = new;
+    }
+    at
 }
 
 /// Torque of gravity: the slope of the potential energy.
@@ -202,7 +241,11 @@ fn arm(what: Withheld, seed: u64, reach: f64) -> PoseDiagnosis {
             Base(by) if group(k) == 2 => shift(by, -0.5 * by, 0.3 * by) * turn(2, by),
             _ => Matrix4::identity(),
         };
-        let seen: Matrix4<f64> = camera * moved * forward(&at, &table).0 * target;
+        let tool = match what {
+            Bend(link, by) => bent(&at, link, by),
+            _ => forward(&at, &table).0,
+        };
+        let seen: Matrix4<f64> = camera * moved * tool * target;
         let p: Vector3<f64> = seen.fixed_view::<3, 1>(0, 3).into();
         let p = p + Vector3::from_fn(|_, _| 5e-5 * normal(r));
         rows.push((group(k), q.iter().chain(p.iter()).copied().collect()));
@@ -316,7 +359,8 @@ fn named(d: &PoseDiagnosis, effect: &str, places: &[&str]) -> bool {
     all.len() == 1
         && right(&all[0])
         && d.found.verdict == "explained"
-        && (effect == "base_pose" || d.found.holdout.is_some_and(|h| h > 0.9))
+        && d.found.holdout.is_some_and(|h| h > 0.9)
+        && (d.found.findings[0].holdout).is_some_and(|h| h > 0.5)
 }
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=4;
@@ -342,10 +386,11 @@ fn withheld_effects_of_an_arm_are_named() {
     case(Table(2, 1, 2e-3), "link_geometry", &["j4"]);
     case(Eccentricity(1, 6e-4), "encoder_eccentricity", &["j2"]);
     case(Compliance(1, 2e-5), "joint_compliance", &["j2"]);
+    case(Bend(1, 5e-5), "link_compliance", &["j3"]);
     case(Play(2, 8e-4), "backlash", &["j3"]);
     case(Sag(2, 8e-4), "backlash", &["j3"]);
     case(Base(1e-3), "base_pose", &["c"]);
-    assert!(wrong <= 1, "{wrong} of 32 are not named");
+    assert!(wrong <= 1, "{wrong} of 36 are not named");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Kinematic effects that may be missing, and where they can sit.
 
 use super::conditions::Conditions;
+use crate::calibrate::bend;
 use crate::calibrate::effects::{PLAY, RUN_OUT, SAG, SOFT};
 use crate::calibrate::feature::{Feature, Rate, Shape};
 use crate::calibrate::file::Calibration;
@@ -22,7 +23,7 @@ pub struct Effect {
 }
 
 /// The effects.
-pub const EFFECTS: [Effect; 9] = [
+pub const EFFECTS: [Effect; 10] = [
     Effect {
         name: "joint_offset",
         equation: "q + η",
@@ -42,6 +43,11 @@ pub const EFFECTS: [Effect; 9] = [
         name: "joint_compliance",
         equation: "q + η τ_g(q)",
         separated_by: "the same postures with another load, and postures in which gravity pulls either way",
+    },
+    Effect {
+        name: "link_compliance",
+        equation: "X E(η b_g(q)), b_g the bend of a beam under gravity, η = 1/(E I) > 0",
+        separated_by: "the same postures with another load, and postures in which the link stands upright and lies",
     },
     Effect {
         name: "backlash",
@@ -125,6 +131,7 @@ impl Catalogue {
         for (joint, motion) in motions.into_iter().enumerate() {
             all.joint(opened, c, joint, motion, tolerance);
         }
+        all.links(opened, c);
         all
     }
 
@@ -167,8 +174,7 @@ impl Catalogue {
         };
         match &opened.kin {
             Kin::Arm(arm) => {
-                let names = arm.links.iter().map(|l| l.body.joint_name.as_str());
-                for (i, n) in names.chain(arm.tip_joint.as_deref()).enumerate() {
+                for (i, n) in arm.places().into_iter().enumerate() {
                     let columns = (6 * i..6 * i + 6).collect();
                     place("link_geometry", vec![n.to_string()], n, columns);
                 }
@@ -297,6 +303,30 @@ impl Catalogue {
                 let column = one("clearance", "m", length, Part::Backlash, shift);
                 add("joint_clearance", true, column);
             }
+        }
+    }
+
+    /// Links that bend.
+    fn links(&mut self, opened: &Opened, c: &Conditions) {
+        let (Kin::Arm(arm), Some(bends)) = (&opened.kin, &c.bends) else {
+            return;
+        };
+        for feature in bend::features(&arm.names(), bends) {
+            let link = &arm.links[feature.joint];
+            self.places.push(Place {
+                effect: "link_compliance",
+                joints: vec![link.body.joint_name.clone()],
+                name: link.body.joint_name.clone(),
+                columns: vec![opened.kin.errors() + self.features.len()],
+                positive: true,
+            });
+            for (row, bends) in self.rates.iter_mut().zip(bends) {
+                row.push(Rate {
+                    turn: 0.0,
+                    place: bends[feature.joint],
+                });
+            }
+            self.features.push(feature);
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a posture does to the joints: torques of gravity, levers of rods, and the side that each joint came from.
 
 use crate::calibrate::bench::Bench;
+use crate::calibrate::bend::Bends;
 use crate::calibrate::file::Calibration;
 use crate::calibrate::kin::Kin;
 use crate::calibrate::open::Opened;
@@ -22,6 +23,8 @@ pub struct Conditions {
     pub torque: Option<Vec<Vec<f64>>>,
     /// change of the reading by the length of the rod, rad/m; chains of arm and rod alone
     pub lever: Option<Vec<Vec<f64>>>,
+    /// how links bend under gravity, per unit of flexibility; serial robots and trees alone
+    pub bends: Option<Bends>,
     /// side that the joint came from: 1 where its reading rose
     pub approach: Vec<Vec<f64>>,
 }
@@ -37,6 +40,7 @@ impl Conditions {
         };
         let mut all = Conditions {
             torque: bench.torques().map(<[Vec<f64>]>::to_vec),
+            bends: bench.bends().cloned(),
             approach,
             q,
             ..Conditions::default()

@@ -7,6 +7,7 @@ use crate::calibrate::fit::{self, Plan};
 use crate::calibrate::frame::Frame;
 use crate::calibrate::model::{Block, Model};
 use crate::calibrate::robust;
+use crate::calibrate::rows::Row;
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -187,7 +188,38 @@ impl<'a> Bed<'a> {
 
     /// Unknowns of a set, with what only held-out rows see.
     pub fn fitted(&self, set: &Set) -> Result<Vec<f64>> {
+        self.fitted_in(self.model.clone(), set)
+    }
+
+    /// The model in which the base of a place has not moved, and the unknowns of the other places in it.
+    pub fn unmoved(&self, place: &Place, rest: &Set) -> Result<(Model<'a>, Vec<f64>)> {
         let mut model = self.model.clone();
+        let own = |k: usize| place.columns.contains(&(self.model.count() + 6 * k));
+        let groups = model.input.groups();
+        for (m, measured) in model.input.measurements.iter().enumerate() {
+            let of = |b: &usize| groups[self.bases[*b]] == measured.group;
+            if (0..self.bases.len()).any(|b| of(&b) && own(b)) {
+                model.start.camera[m] = self.cameras[m];
+            }
+        }
+        let x = self.fitted_in(model.clone(), rest)?;
+        Ok((model, x))
+    }
+
+    /// Whether rows held out are seen by the instrument of a group's base.
+    pub fn judged(&self, place: &Place) -> bool {
+        let input = self.model.input;
+        let seen = |fit: bool, row: &Row| {
+            let m = &input.measurements[row.measurement];
+            (row.fit == fit && (!fit || m.group == place.name)).then_some(&m.instrument)
+        };
+        let all = |fit| input.rows.iter().filter_map(move |r| seen(fit, r));
+        all(true)
+            .next()
+            .is_some_and(|own| all(false).any(|i| i == own))
+    }
+
+    fn fitted_in(&self, mut model: Model, set: &Set) -> Result<Vec<f64>> {
         let mut plan = Plan {
             weights: self.weights.clone(),
             free: Vec::new(),

@@ -7,10 +7,12 @@ use super::catalogue::Catalogue;
 use super::conditions::Conditions;
 use super::linear::Bed;
 use super::verdict::Found;
+use crate::calibrate::bend;
 use crate::calibrate::effects::Gravity;
 use crate::calibrate::frame::Frame;
+use crate::calibrate::kin::Kin;
 use crate::calibrate::kind::Kind;
-use crate::calibrate::layout::Start;
+use crate::calibrate::layout::{Layout, Start};
 use crate::calibrate::model::Model;
 use crate::calibrate::open::Opened;
 use crate::calibrate::poses::{self, candidates};
@@ -247,8 +249,8 @@ impl Pool {
 fn pool(opened: &Opened, bed: &Bed, gravity: Option<&Gravity>, seed: u64) -> Result<Option<Pool>> {
     let input = bed.model.input;
     let measured = &input.measurements[0];
-    if measured.kind.is_line() {
-        // where the gauge would stand is not known
+    if measured.kind.is_line() || measured.kind == Kind::Ball {
+        // where the gauge would stand is not known; a ball leaves the turns open
         return Ok(None);
     }
     let points: Vec<usize> = match measured.kind {
@@ -264,6 +266,7 @@ fn pool(opened: &Opened, bed: &Bed, gravity: Option<&Gravity>, seed: u64) -> Res
             .iter()
             .map(|&m| bed.model.socket(m, &bed.x))
             .collect(),
+        grip: (measured.kind == Kind::Loop).then(|| bed.model.grip(0, &bed.x).0),
         region: None,
         sight: None,
         std: measured.std,
@@ -283,6 +286,10 @@ fn pool(opened: &Opened, bed: &Bed, gravity: Option<&Gravity>, seed: u64) -> Res
     let joints = opened.joints.len();
     let mut conditions = Conditions {
         torque: gravity.map(|g| g.torques(&q)),
+        bends: gravity.and_then(|g| match &opened.kin {
+            Kin::Arm(arm) => Some(bend::bends(g, &arm.names(), &q)),
+            Kin::Parallel(_) => None,
+        }),
         approach: (0..q.len())
             .map(|_| (0..joints).map(|_| side(&mut rng)).collect())
             .collect(),
@@ -298,7 +305,8 @@ fn pool(opened: &Opened, bed: &Bed, gravity: Option<&Gravity>, seed: u64) -> Res
         camera: vec![bed.model.camera(0, &bed.x); many],
         target: vec![bed.model.target(0, &bed.x); many],
         socket: request.points.clone(),
-        plane: vec![(nalgebra::Vector3::z(), 0.0); many],
+        grip: vec![bed.model.grip(0, &bed.x).0; many],
+        ..Start::none(many)
     };
     let mut model = Model::new(
         &calibration,
@@ -324,7 +332,11 @@ fn pool(opened: &Opened, bed: &Bed, gravity: Option<&Gravity>, seed: u64) -> Res
             let pairs = [
                 (&model.layout.camera, &bed.model.layout.camera, 6),
                 (&model.layout.target, &bed.model.layout.target, 6),
-                (&model.layout.contact, &bed.model.layout.contact, 3),
+                (
+                    &model.layout.contact,
+                    &bed.model.layout.contact,
+                    Layout::width(measured.kind),
+                ),
             ];
             pairs.iter().find_map(|(here, there, width)| {
                 (0..many).find_map(|m| {

@@ -16,6 +16,15 @@ fn words(effect: &str) -> String {
     effect.replace('_', " ")
 }
 
+/// A share of the gap in words.
+pub fn share(x: f64) -> String {
+    match x {
+        x if x <= 0.0 => "nothing".into(),
+        x if x < 0.001 => format!("{}{NBSP}%", significant(100.0 * x, 1)),
+        x => percent(x),
+    }
+}
+
 /// The verdict in a sentence, and how good the news is.
 pub fn sentence(d: &PoseDiagnosis) -> (Tone, String) {
     let rms = d.errors(true, 0).map_or(f64::NAN, |s| s.rms);
@@ -162,8 +171,8 @@ fn findings(d: &PoseDiagnosis) -> Section {
                 html! { @if claimed { strong { (words(f.effect)) } } @else { (words(f.effect)) } },
                 html! { (f.places.join(" or ")) },
                 html! { (percent(f.confidence)) },
-                html! { (percent(f.explains)) " (" (percent(f.interval[0])) " to " (percent(f.interval[1])) ")" },
-                html! { @if let Some(h) = f.holdout { (percent(h)) } @else { "–" } },
+                html! { (share(f.explains)) " (" (share(f.interval[0])) " to " (share(f.interval[1])) ")" },
+                html! { @if let Some(h) = f.holdout { (share(h)) } @else { "–" } },
                 html! { (values.join("; ")) },
                 html! { (rivals.join(", ")) },
             ]
@@ -179,7 +188,7 @@ fn findings(d: &PoseDiagnosis) -> Section {
                 &rows,
             ))
             p { "Claims are in bold: no other explanation of these rows is as likely, and rows held out agree. Shares \
-                 are of the gap above the noise, with the other findings free." }
+                 are of the square of the gap above the noise, with the other findings free: one hundredth of it is a tenth in length." }
         },
     )
 }

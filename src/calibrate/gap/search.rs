@@ -10,8 +10,13 @@ use rayon::prelude::*;
 
 /// What the evidence must gain for an effect more, natural logarithm: one of about fifty places and five sizes.
 pub const PRICE: f64 = 6.0;
+/// What the evidence must gain beyond that for a link that bends: gears and bearings of an arm give way twenty times as
+/// often as its links.
+const RARE: f64 = 3.0;
 /// Factors on the expected size of an effect.
 const SIZES: [f64; 5] = [0.3, 1.0, 3.0, 10.0, 30.0];
+/// By how much another set must be better to be taken, natural logarithm.
+const BETTER: f64 = 0.1;
 /// Most members of a set.
 const MOST: usize = 40;
 
@@ -45,10 +50,19 @@ impl Search<'_> {
         Some(found)
     }
 
+    /// What the evidence must gain for a set.
+    pub fn price(&self, set: &Set) -> f64 {
+        let each = set.iter().map(|(p, _)| match self.places[*p].effect {
+            "link_compliance" => PRICE + RARE,
+            _ => PRICE,
+        });
+        each.sum()
+    }
+
     /// Evidence less the price of its members.
     pub fn score(&self, set: &Set) -> f64 {
         match self.solve(set) {
-            Some(s) => s.evidence - PRICE * set.len() as f64,
+            Some(s) => s.evidence - self.price(set),
             None => f64::NEG_INFINITY,
         }
     }
@@ -121,6 +135,24 @@ impl Search<'_> {
             }
         }
         (score, set)
+    }
+
+    /// A better set without one of the members, where there is one: several others in its place are no single exchange.
+    /// Dimensions are left as they are; they are many and seldom in doubt.
+    pub fn aside(&self, set: &Set) -> Option<Set> {
+        let score = self.score(set);
+        let doubtful = |m: &&(usize, f64)| {
+            let effect = self.places[m.0].effect;
+            !matches!(effect, "link_geometry" | "leg_geometry")
+        };
+        let others = set.iter().filter(doubtful).map(|(own, _)| {
+            let rest = set.iter().copied().filter(|m| m.0 != *own).collect();
+            self.climb(rest, &[*own])
+        });
+        let best = others.reduce(|a, b| if b.0 > a.0 { b } else { a });
+        let mut other = best.filter(|b| b.0 > score + BETTER)?.1;
+        other.sort_by_key(|m| m.0);
+        Some(other)
     }
 
     /// The best set.

@@ -2,7 +2,8 @@
 
 use super::linear::Bed;
 use super::problem::{Member, Solved};
-use super::search::{PRICE, Search, Set};
+use super::search::{Search, Set};
+use crate::calibrate::model::Model;
 use crate::error::{Result, Warning, WarningKind};
 
 /// Rounds of making linear and searching.
@@ -88,7 +89,7 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
     bed.x = bed.fitted(&Set::new())?;
     let empty = bed.x.clone();
     let cost_empty = bed.cost(&empty);
-    let held_empty = held_out(bed, &empty);
+    let held_empty = held_out(&bed.model, &empty);
     let mut set = Set::new();
     let mut problem = bed.problem()?;
     for round in 0..ROUNDS {
@@ -104,6 +105,18 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
         if same && round > 0 {
             break;
         }
+    }
+    for _ in 0..ROUNDS {
+        let search = Search {
+            problem: &problem,
+            places: bed.places,
+        };
+        let Some(other) = search.aside(&set) else {
+            break;
+        };
+        bed.fit(&other, &problem)?;
+        problem = bed.problem()?;
+        set = other;
     }
     let x = bed.x.clone();
     let cost = bed.cost(&x);
@@ -129,8 +142,8 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
     let limit = |taken: f64| KNOWN + SURE * (2.0 / free(taken)).sqrt();
     let is_gap = squares[0] > limit(0.0) || !set.is_empty();
     let total = (cost_empty - free(0.0)).max(1e-9);
-    let held = held_out(bed, &x);
-    let held_gap = held_empty.map(|h| (h - 1.0).max(1e-9));
+    let held = held_out(&bed.model, &x);
+    let held_gap = held_empty.as_ref().map(|h| (h.mean - 1.0).max(1e-9));
     let left = match squares[1] > limit(decided) {
         true => ((squares[1] - 1.0) / (squares[0] - 1.0).max(1e-9)).clamp(0.0, 1.0),
         false => 0.0,
@@ -141,12 +154,20 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
             let mut f = finding(bed, &search, &set, solved, k, total);
             let mut rest = set.clone();
             rest.remove(k);
-            // a moved base is not taken back here: it is in the cameras
-            if bed.places[set[k].0].effect != "base_pose"
-                && let (Some(with), Some(gap)) = (held, held_gap)
-                && let Some(without) = held_out(bed, &bed.fitted(&rest)?)
-            {
-                f.holdout = Some(((without - with) / gap).clamp(-1.0, 1.0));
+            let place = &bed.places[set[k].0];
+            // a moved base is in the cameras
+            let without = match place.effect {
+                "base_pose" if !bed.judged(place) => None,
+                "base_pose" => {
+                    let (model, x) = bed.unmoved(place, &rest)?;
+                    held_out(&model, &x)
+                }
+                _ => held_out(&bed.model, &bed.fitted(&rest)?),
+            };
+            let mut helps = true;
+            if let (Some(with), Some(gap), Some(without)) = (&held, held_gap, &without) {
+                f.holdout = Some(((without.mean - with.mean) / gap).clamp(-1.0, 1.0));
+                helps = with.better_than(without);
             }
             // what is left is no noise: fitted rows alone prove nothing, and an effect that is smaller than it may be
             // a part of it
@@ -156,7 +177,7 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
                 0.0
             };
             let small = left > LITTLE && f.explains < left;
-            if small || f.holdout.map_or(left > LITTLE, |h| h <= enough) {
+            if small || !helps || f.holdout.map_or(left > LITTLE, |h| h <= enough) {
                 f.confidence = f.confidence.min(NOT_HELD);
             }
             findings.push(f);
@@ -184,7 +205,7 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
     let holdout = held
         .zip(held_gap)
         .zip(held_empty)
-        .map(|((h, gap), e)| ((e - h) / gap).clamp(-1.0, 1.0));
+        .map(|((h, gap), e)| ((e.mean - h.mean) / gap).clamp(-1.0, 1.0));
     Ok(Found {
         verdict,
         findings,
@@ -196,18 +217,48 @@ pub(super) fn found(bed: &mut Bed, stated: bool, warnings: &mut Vec<Warning>) ->
     })
 }
 
-/// Mean square of the whitened residuals of rows held out: of the lower nine tenths of them, which strays do not reach.
-fn held_out(bed: &Bed, x: &[f64]) -> Option<f64> {
-    let rows = &bed.model.input.rows;
-    let own = (0..rows.len()).filter(|&i| !rows[i].fit);
-    let mut squares: Vec<f64> = own
-        .filter_map(|i| bed.model.block(i, x))
-        .map(|b| b.r.norm_squared() / b.r.len() as f64)
-        .collect();
-    squares.sort_by(f64::total_cmp);
-    squares.truncate((0.9 * squares.len() as f64).ceil() as usize);
-    let n = squares.len() as f64;
-    (n >= 3.0).then(|| squares.iter().sum::<f64>() / n)
+/// Rows held out.
+struct Held {
+    /// mean square of the whitened residuals, by row; not a number of fitted rows and where a posture cannot be taken
+    squares: Vec<f64>,
+    /// their mean over the lower nine tenths, which strays do not reach
+    mean: f64,
+}
+
+impl Held {
+    /// Whether these rows are nearer than without an effect, and by more than a standard error.
+    fn better_than(&self, without: &Held) -> bool {
+        let both = self.squares.iter().zip(&without.squares);
+        let mut all: Vec<(f64, f64)> = both
+            .filter(|(w, o)| w.is_finite() && o.is_finite())
+            .map(|(w, o)| (*w, o - w))
+            .collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.truncate((KEPT * all.len() as f64).ceil() as usize);
+        let n = (all.len() as f64).max(1.0);
+        let mean = all.iter().map(|a| a.1).sum::<f64>() / n;
+        let spread = all.iter().map(|a| (a.1 - mean).powi(2)).sum::<f64>() / n;
+        mean > (spread / n).sqrt()
+    }
+}
+
+/// Share of the rows held out that counts: strays do not reach it.
+const KEPT: f64 = 0.9;
+
+/// What rows held out leave; `None` of fewer than three.
+fn held_out(model: &Model, x: &[f64]) -> Option<Held> {
+    let rows = &model.input.rows;
+    let square = |i: usize| match model.block(i, x).filter(|_| !rows[i].fit) {
+        Some(b) => b.r.norm_squared() / b.r.len() as f64,
+        None => f64::NAN,
+    };
+    let squares: Vec<f64> = (0..rows.len()).map(square).collect();
+    let mut kept: Vec<f64> = squares.iter().copied().filter(|s| s.is_finite()).collect();
+    kept.sort_by(f64::total_cmp);
+    kept.truncate((KEPT * kept.len() as f64).ceil() as usize);
+    let n = kept.len() as f64;
+    let mean = kept.iter().sum::<f64>() / n;
+    (n >= 3.0).then_some(Held { squares, mean })
 }
 
 fn finding(
@@ -230,7 +281,7 @@ fn finding(
             unit,
         }
     };
-    let best = solved.evidence - PRICE * set.len() as f64;
+    let best = solved.evidence - search.price(set);
     let mut rest = set.clone();
     rest.remove(k);
     // others in its place, none, and the best explanation without it

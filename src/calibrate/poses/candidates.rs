@@ -1,5 +1,6 @@
 //! Postures that the robot can take.
 
+use super::reach::{Wanted, reach};
 use super::{Request, Sight};
 use crate::calibrate::frame::Frame;
 use crate::calibrate::kin::Kin;
@@ -9,7 +10,6 @@ use crate::calibrate::parallel::Parallel;
 use crate::collision::Scene;
 use crate::collision::scene::{Balls, append_poses};
 use crate::error::{Error, Result, Warning, WarningKind};
-use nalgebra::{DMatrix, DVector, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -46,9 +46,6 @@ const DRAWS: usize = 20;
 const BATCH: usize = 256;
 /// Part of a range that is left free at both ends.
 const MARGIN: f64 = 0.03;
-/// Steps to a point, and how near counts as reached, m.
-const STEPS: usize = 20;
-const REACHED: f64 = 1e-9;
 
 impl<'a> Search<'a> {
     /// For a robot.
@@ -84,9 +81,9 @@ impl<'a> Search<'a> {
                 (ranges, Vec::new())
             }
             Kin::Parallel(p) => {
-                if request.kind == Kind::Point {
+                if request.kind == Kind::Point || request.kind.is_loop() {
                     return Err(Error::Argument(
-                        "--point is for serial robots; the platform of a parallel robot is seen by a camera or tracker"
+                        "points and loops are for serial robots and trees; the platform of a parallel robot is seen by a camera or tracker"
                             .into(),
                     ));
                 }
@@ -192,9 +189,7 @@ impl<'a> Search<'a> {
     fn posture(&self, mut at: Vec<f64>, point: usize) -> Option<Candidate> {
         let candidate = match &self.opened.kin {
             Kin::Arm(_) => {
-                if let Some(p) = self.request.points.get(point) {
-                    self.reach(&mut at, p)?;
-                }
+                self.bring(&mut at, point)?;
                 let frame = self.opened.kin.nominal(&at).ok()?;
                 Candidate {
                     q: at,
@@ -218,32 +213,20 @@ impl<'a> Search<'a> {
         Some(candidate)
     }
 
-    /// Moves the joints until the frame's origin is in a point: least steps, by the Jacobian.
-    fn reach(&self, q: &mut [f64], to: &Vector3<f64>) -> Option<()> {
+    /// Moves the joints until the frame's origin is in its point, or the second arm where the first one holds it; as they
+    /// are where neither is asked for.
+    fn bring(&self, q: &mut [f64], point: usize) -> Option<()> {
         let Kin::Arm(arm) = &self.opened.kin else {
             return None;
         };
-        for _ in 0..STEPS {
-            let at = self.opened.kin.nominal(q).ok()?.p;
-            let gap = to - at;
-            if gap.norm() < REACHED {
-                let inside = q
-                    .iter()
-                    .zip(&self.ranges)
-                    .all(|(v, [a, b])| (*a..=*b).contains(v));
-                return inside.then_some(());
-            }
-            let j = arm.by_joints(q, &self.zeros);
-            let gap =
-                DVector::from_iterator(3, (gap * (0.2 / gap.norm()).min(1.0)).iter().copied());
-            let jt = j.transpose();
-            let square: DMatrix<f64> = &j * &jt + DMatrix::identity(3, 3) * 1e-8;
-            let step = jt * square.cholesky()?.solve(&gap);
-            for (v, d) in q.iter_mut().zip(step.iter()) {
-                *v += d;
-            }
-        }
-        None
+        let wanted = match (self.request.points.get(point), &self.request.grip) {
+            (Some(p), _) => Wanted::Point(*p),
+            (None, Some(grip)) => Wanted::Grip(*grip),
+            (None, None) => return Some(()),
+        };
+        reach(arm, q, &self.zeros, &wanted)?;
+        let inside = |(v, [a, b]): (&f64, &[f64; 2])| (*a..=*b).contains(v);
+        q.iter().zip(&self.ranges).all(inside).then_some(())
     }
 
     /// Whether nothing touches, and nothing stands between the target and a camera.
@@ -267,7 +250,8 @@ impl<'a> Search<'a> {
         append_poses(robot, &all, &mut poses);
         let hidden = |s: &Sight| match &self.opened.kin {
             Kin::Arm(arm) => {
-                let last = arm.links.last().map(|l| l.body.name.as_str());
+                let last = arm.links.get(arm.ends[0].link);
+                let last = last.map(|l| l.body.name.as_str());
                 let carrier = robot
                     .bodies
                     .iter()

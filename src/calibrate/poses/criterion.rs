@@ -181,6 +181,7 @@ impl<'a> Problem<'a> {
             frame: None,
             gravity: None,
             effects: None,
+            other: None,
             measurements: self.model.input.measurements.clone(),
             distances: Vec::new(),
             rows: vec![self.model.input.rows[row].clone()],
@@ -226,18 +227,25 @@ fn jacobian(model: &Model, row: usize) -> Option<DMatrix<f64>> {
 fn predicted(model: &Model, view: &[usize], kind: Kind) -> Result<DMatrix<f64>> {
     let n = model.count();
     let x = vec![0.0; n];
-    let mut l = DMatrix::zeros(3 * view.len(), n);
-    let mut rigid = DMatrix::zeros(3 * view.len(), 6);
-    for (v, &row) in view.iter().enumerate() {
+    let mut seen = Vec::with_capacity(view.len());
+    for &row in view {
+        if kind.is_loop() {
+            // what two arms tell is how they meet
+            let b = (model.block(row, &x))
+                .ok_or_else(|| Error::Infeasible("a candidate cannot be taken".into()))?;
+            let std = model.input.measurements[model.input.rows[row].measurement].std[0];
+            seen.push((Vector3::zeros(), b.columns, b.j * (std * model.noise)));
+            continue;
+        }
         let posed = model.posed(row, &x)?;
-        let (p, columns, j) = match kind {
+        seen.push(match kind {
             Kind::Pose | Kind::Position => model.seen_at(row, &posed, &x),
-            _ => (
-                posed.frame.p,
-                (0..model.of_robot).collect(),
-                posed.jacobian.clone(),
-            ),
-        };
+            _ => (posed.frame.p, (0..model.of_robot).collect(), posed.jacobian),
+        });
+    }
+    let mut l = DMatrix::zeros(3 * seen.len(), n);
+    let mut rigid = DMatrix::zeros(3 * seen.len(), 6);
+    for (v, (p, columns, j)) in seen.iter().enumerate() {
         for (k, &c) in columns.iter().enumerate() {
             for i in 0..3 {
                 l[(3 * v + i, c)] = j[(i, k)] * model.unknowns[c].scale;
@@ -247,15 +255,15 @@ fn predicted(model: &Model, view: &[usize], kind: Kind) -> Result<DMatrix<f64>> 
             rigid[(3 * v + k, k)] = 1.0;
             let mut axis = Vector3::zeros();
             axis[k] = 1.0;
-            let swing = axis.cross(&p);
+            let swing = axis.cross(p);
             for i in 0..3 {
                 rigid[(3 * v + i, 3 + k)] = swing[i];
             }
         }
     }
-    if !matches!(kind, Kind::Pose | Kind::Position) {
+    if !matches!(kind, Kind::Pose | Kind::Position) && !kind.is_loop() {
         let q = rigid.qr().q();
         l -= &q * q.tr_mul(&l);
     }
-    Ok(l.tr_mul(&l) / view.len().max(1) as f64)
+    Ok(l.tr_mul(&l) / seen.len().max(1) as f64)
 }

@@ -9,16 +9,20 @@
 //! ```
 //!
 //! One after another greedily, each from a random part of the candidates (Mirzasoleiman et al. 2015), then by
-//! exchange, then by small steps of single postures. Last they are put in an order with a short way. For sockets the
-//! rigid motions of all predictions together are taken out of `L`: no contact tells where the base stands.
+//! exchange, then by small steps of single postures. Last they are put in an order with a short way. For sockets
+//! the rigid motions of all predictions together are taken out of `L`: no contact tells where the base stands. For
+//! loops what is predicted is where the second arm's tool meets the first one.
 
 pub(super) mod candidates;
 mod criterion;
 mod order;
 pub mod page;
+mod reach;
 mod rehearse;
 mod sight;
 
+#[cfg(test)]
+pub(super) use reach::{Wanted, reach};
 pub use rehearse::{rehearse, toml};
 pub use sight::Sight;
 
@@ -46,6 +50,8 @@ pub struct Request {
     pub kind: Kind,
     /// points to reach, base axes, m; for sockets
     pub points: Vec<Vector3<f64>>,
+    /// how the second arm's frame sits in that of the first; for a loop
+    pub grip: Option<Frame>,
     /// what the frame's origin must stay in, base axes, m: what the camera sees
     pub region: Option<[[f64; 2]; 3]>,
     /// a fixed camera that must see the target
@@ -91,7 +97,7 @@ pub struct Poses {
     pub warnings: Vec<Warning>,
 }
 
-/// Most candidates that reach a point: each takes a search of its own.
+/// Most candidates that reach a point or close a loop: each takes a search of its own.
 const REACHING: usize = 1000;
 /// Draws of random postures to compare with.
 const DRAWS: usize = 20;
@@ -112,7 +118,7 @@ pub fn choose(opened: &Opened, request: &Request) -> Result<Poses> {
     let mut rng = ChaCha8Rng::seed_from_u64(request.seed);
     let search = Search::new(opened, request)?;
     let wanted = match request.kind {
-        Kind::Point => request.candidates.min(REACHING),
+        Kind::Point | Kind::Loop => request.candidates.min(REACHING),
         _ => request.candidates,
     };
     let (found, draws) = search.draw(&mut rng, wanted.max(2 * request.count));
@@ -214,6 +220,7 @@ pub(super) fn calibration(opened: &Opened, request: &Request, found: &[Candidate
             group: format!("point{}", k + 1),
             std: request.std,
             instrument: "camera".into(),
+            grip: None,
         })
         .collect();
     let row = |c: &Candidate| Row {
@@ -235,6 +242,7 @@ pub(super) fn calibration(opened: &Opened, request: &Request, found: &[Candidate
         frame: None,
         gravity: None,
         effects: None,
+        other: None,
         measurements,
         distances: Vec::new(),
         rows: found.iter().map(row).collect(),
@@ -246,12 +254,11 @@ pub(super) fn calibration(opened: &Opened, request: &Request, found: &[Candidate
 
 fn start(request: &Request, count: usize) -> Start {
     Start {
-        camera: vec![Frame::identity(); count],
-        target: vec![Frame::identity(); count],
         socket: (0..count)
             .map(|k| request.points.get(k).copied().unwrap_or_default())
             .collect(),
-        plane: vec![(Vector3::z(), 0.0); count],
+        grip: vec![request.grip.unwrap_or(Frame::identity()); count],
+        ..Start::none(count)
     }
 }
 

@@ -1,8 +1,10 @@
-//! A rehearsal: what a camera or tracker would see of a robot whose geometry is off by its tolerances.
+//! A rehearsal: what a camera or tracker would see, or where a loop would close, of a robot whose geometry is off by its tolerances.
 
 use super::candidates::Search;
+use super::reach::{Wanted, reach};
 use super::{Poses, Request};
 use crate::calibrate::frame::{Frame, exp};
+use crate::calibrate::kin::Kin;
 use crate::calibrate::kind::Kind;
 use crate::calibrate::open::Opened;
 use crate::error::{Error, Result};
@@ -19,9 +21,9 @@ const HELD_OUT: usize = 200;
 /// # Errors
 /// A kind that is no camera or tracker; too few postures to hold out.
 pub fn rehearse(opened: &Opened, request: &Request, chosen: &Poses, seed: u64) -> Result<String> {
-    if !request.kind.has_instrument() {
+    if !request.kind.has_instrument() && request.kind != Kind::Loop {
         return Err(Error::Argument(format!(
-            "a rehearsal is of poses or positions, not of kind \"{}\"",
+            "a rehearsal is of poses, positions or loops, not of kind \"{}\"",
             request.kind.name()
         )));
     }
@@ -51,6 +53,21 @@ pub fn rehearse(opened: &Opened, request: &Request, chosen: &Poses, seed: u64) -
         + "\n";
     let rows = chosen.postures.iter().map(|c| (c, true));
     for (c, fit) in rows.chain(held_out.iter().map(|c| (c, false))) {
+        if request.kind == Kind::Loop {
+            // the arms give way until the loop closes, all but the noise
+            let mut q = c.q.clone();
+            let mut held = request.grip.unwrap_or(Frame::identity());
+            if fit {
+                held.p += Vector3::from_fn(|_, _| request.std[0] * normal());
+                held.r *= exp(&Vector3::from_fn(|_, _| request.std[1] * normal()));
+            }
+            let Kin::Arm(arm) = &opened.kin else { continue };
+            if reach(arm, &mut q, &x, &Wanted::Grip(held)).is_some() {
+                out += &q.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+                out += if fit { ",fit\n" } else { ",holdout\n" };
+            }
+            continue;
+        }
         let Ok(posed) = opened.kin.pose(&c.q, &x, &[], &[], Some(&c.frame)) else {
             continue;
         };
@@ -73,11 +90,19 @@ pub fn rehearse(opened: &Opened, request: &Request, chosen: &Poses, seed: u64) -
 }
 
 /// The `calibration.toml` for such a file.
-pub fn toml(robot: &str, frame: Option<&str>, request: &Request, file: &str) -> String {
+pub fn toml(
+    robot: &str,
+    [frame, other]: [Option<&str>; 2],
+    request: &Request,
+    file: &str,
+) -> String {
     let name = |s: &str| toml::Value::from(s).to_string();
     let mut out = format!("robot = {}\n", name(robot));
     if let Some(f) = frame {
         out += &format!("frame = {}\n", name(f));
+    }
+    if let Some(o) = other {
+        out += &format!("other = {}\n", name(o));
     }
     let [std, angle] = request.std;
     out += &format!(
@@ -85,7 +110,7 @@ pub fn toml(robot: &str, frame: Option<&str>, request: &Request, file: &str) -> 
         request.kind.name(),
         name(file)
     );
-    if request.kind == Kind::Pose {
+    if matches!(request.kind, Kind::Pose | Kind::Loop) {
         out += &format!("angle_std = {angle}\n");
     }
     out + &format!(

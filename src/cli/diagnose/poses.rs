@@ -53,9 +53,9 @@ pub fn run(args: Args) -> Result<()> {
             f.effect,
             f.places.join(" or "),
             percent(f.confidence),
-            percent(f.explains),
+            page::share(f.explains),
             match f.holdout {
-                Some(h) => format!("{} on rows held out", percent(h)),
+                Some(h) => format!("{} on rows held out", page::share(h)),
                 None => "not judged by rows held out".into(),
             }
         );
