@@ -3,7 +3,8 @@
 use super::entry::Entry;
 use super::frame::Frame;
 use super::kind::Kind;
-use super::rows::{self, Row, Source};
+use super::row::{Row, Source};
+use super::rows;
 use crate::error::{Error, Result, Warning};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};

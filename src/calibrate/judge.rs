@@ -3,7 +3,7 @@
 use super::frame::log;
 use super::kind::Kind;
 use super::model::Model;
-use super::rows::Value;
+use super::row::Value;
 use super::start::median;
 use nalgebra::Vector3;
 

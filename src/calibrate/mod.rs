@@ -41,6 +41,7 @@ mod pixels;
 pub mod poses;
 mod result;
 mod robust;
+mod row;
 mod row_columns;
 mod row_doubts;
 mod rows;

@@ -19,7 +19,7 @@ use super::kin::Kin;
 use super::kind::Kind;
 use super::layout::{Layout, Start};
 use super::parallel::Parallel;
-use super::rows::{Row, Value};
+use super::row::{Row, Value};
 use super::serial::Posed;
 use super::unknown::Unknown;
 use crate::error::Result;

@@ -7,7 +7,7 @@ use super::identifiable::Identifiability;
 use super::judge::{Errors, Group, Stats};
 use super::kind::Kind;
 use super::model::Model;
-use super::rows::Row;
+use super::row::Row;
 use super::select::Trial;
 use super::serial::Posed;
 use super::unknown::Unknown;

@@ -1,7 +1,7 @@
 //! Which column of a file of readings is what.
 
 use super::kind::Kind;
-use super::rows::Source;
+use super::row::Source;
 use crate::error::{Error, Result};
 
 /// Indices of columns.

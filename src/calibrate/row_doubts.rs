@@ -1,6 +1,6 @@
 //! What looks wrong about a file of readings as a whole.
 
-use super::rows::{Row, Source, Value};
+use super::row::{Row, Source, Value};
 use crate::error::{Error, Result, Warning, WarningKind, number};
 use crate::median::median;
 

@@ -263,7 +263,7 @@ fn folds(input: &Calibration) -> Vec<Option<usize>> {
         }
     }
     let by_group = used.len() >= 3;
-    let each = |(i, r): (usize, &super::rows::Row)| match (r.fit, by_group) {
+    let each = |(i, r): (usize, &super::row::Row)| match (r.fit, by_group) {
         (false, _) => None,
         (true, true) => used.iter().position(|&g| g == groups[i]),
         (true, false) => Some(i % FOLDS),

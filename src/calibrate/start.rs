@@ -10,7 +10,7 @@ use super::frame::{Frame, log, nearest_rotation};
 use super::kin::Kin;
 use super::kind::Kind;
 use super::layout::Start;
-use super::rows::Value;
+use super::row::Value;
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -263,7 +263,7 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
                 start.target[m] = start.target[first];
                 continue;
             }
-            let fits = |r: &super::rows::Row| same(r.measurement);
+            let fits = |r: &super::row::Row| same(r.measurement);
             let any_fit = input.rows.iter().any(|r| fits(r) && r.fit);
             let mut pairs = Vec::new();
             let mut degrees = Some(Vec::new());

@@ -7,7 +7,7 @@ use super::frame::{Frame, exp};
 use super::kin::Kin;
 use super::layout::Start;
 use super::model::{Algorithm, Model, Settings};
-use super::rows::{Row, Value};
+use super::row::{Row, Value};
 use super::*;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};

@@ -12,7 +12,7 @@ use crate::error::Error;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rows::Value;
+use row::Value;
 use std::path::PathBuf;
 
 /// A column that turns, two arms of six joints, a tool each.

@@ -139,7 +139,7 @@ impl Catalogue {
     pub fn add_bases(&mut self, input: &Calibration, unknowns: usize) {
         let groups = input.groups();
         let fitted = |g: usize| {
-            let own = |r: &&crate::calibrate::rows::Row| r.fit && input.group_of(r) == g;
+            let own = |r: &&crate::calibrate::row::Row| r.fit && input.group_of(r) == g;
             let seen = input.rows.iter().filter(own);
             seen.filter(|r| input.measurements[r.measurement].kind.has_instrument())
                 .count()

@@ -59,7 +59,7 @@ impl Conditions {
 }
 
 fn stated_sides(input: &Calibration, joints: usize) -> Vec<Vec<f64>> {
-    let side = |r: &crate::calibrate::rows::Row| match r.approach.len() == joints {
+    let side = |r: &crate::calibrate::row::Row| match r.approach.len() == joints {
         true => r.approach.iter().map(|a| a.clamp(-1.0, 1.0)).collect(),
         false => vec![0.0; joints],
     };

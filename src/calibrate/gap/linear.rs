@@ -7,7 +7,7 @@ use crate::calibrate::fit::{self, Plan};
 use crate::calibrate::frame::Frame;
 use crate::calibrate::model::{Block, Model};
 use crate::calibrate::robust;
-use crate::calibrate::rows::Row;
+use crate::calibrate::row::Row;
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 

@@ -216,7 +216,7 @@ fn spread(model: &Model, weights: &[f64], stated: bool) -> f64 {
 fn lines(bed: &Bed, [before, after]: [&Errors; 2]) -> Vec<Line> {
     let input = bed.model.input;
     let (_, strays) = judge::strays(&bed.model, after);
-    let each = |(i, r): (usize, &super::rows::Row)| Line {
+    let each = |(i, r): (usize, &super::row::Row)| Line {
         group: input.group_of(r),
         fit: r.fit,
         stray: if r.fit {

@@ -32,7 +32,7 @@ use super::kind::Kind;
 use super::layout::Start;
 use super::model::{Model, Settings};
 use super::open::Opened;
-use super::rows::{Row, Value};
+use super::row::{Row, Value};
 use crate::error::{Error, Result, Warning};
 use candidates::{Candidate, Search};
 use criterion::{Chosen, Problem};
