@@ -4,12 +4,13 @@
 //! ```text
 //! d = zero (record) + delay q̇ + scale q                       always estimated along
 //!   − τ_l / k                                                  joint_elasticity
-//!   − (b/2) tanh(τ_l / (0.05 rms τ_l))                          backlash
+//!   − (b/2) sgn τ_l                                            backlash
 //!   + Σ_n a_n cos(n N q) + b_n sin(n N q),  n = 1, 2            transmission_error, N = gear_ratio
 //!   + a cos q + b sin q                                        encoder_eccentricity
 //! ```
 //!
-//! `τ_l` is the torque that the joint transmits, of the bodies beyond it. An effect enters where it predicts blocks of the
+//! `τ_l` is the torque that the joint transmits, of the bodies beyond it. While it is small the side on which play is
+//! closed is not known, and those samples are left out. An effect enters where it predicts blocks of the
 //! records that it was not fitted to, by more than chance and by a share that matters, with a sign that a machine can have.
 //! The gap in torque plays no part here.
 
@@ -151,6 +152,11 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
         });
         next += width;
     }
+    let kept = |k: usize| -> Vec<usize> {
+        let mut at = rows(data, k, j, every);
+        at.retain(|i| torque[data.start[k] + i].abs() >= closed);
+        at
+    };
     let row = |k: usize, i: usize, zero: Option<usize>| -> Vec<f64> {
         let r = &data.records[k];
         let ((q, v), tau) = (r.state(j), torque[data.start[k] + i]);
@@ -161,7 +167,7 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
         }
         a.extend([v, q]);
         if closed > 0.0 {
-            a.extend([-tau, -0.5 * (tau / closed).tanh()]);
+            a.extend([-tau, -0.5 * tau.signum()]);
         }
         if let Some(gear) = gear {
             let at = gear * q;
@@ -186,7 +192,7 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
     let length = T.second.block.min(0.5 * seconds / T.second.blocks as f64);
     let mut blocks = Blocks::new(next);
     for (z, &k) in fitted.iter().enumerate() {
-        let at = rows(data, k, j, every);
+        let at = kept(k);
         let step = data.records[k].dt * every as f64;
         let long = (length / step).ceil().max(1.0);
         for part in at.chunks(long as usize) {
@@ -251,7 +257,7 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
         let [mut nuisance, mut all] = [0.0, 0.0];
         let held = (0..data.records.len()).filter(|k| !data.records[*k].fit);
         for k in held {
-            let at = rows(data, k, j, every);
+            let at = kept(k);
             let rest = |of: &[usize], x: &[f64]| -> f64 {
                 let e: Vec<f64> = at
                     .iter()
@@ -267,7 +273,7 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
     };
     let mut points = Vec::new();
     for (z, &k) in fitted.iter().enumerate() {
-        let at = rows(data, k, j, every);
+        let at = kept(k);
         for &i in at
             .iter()
             .step_by((at.len() * zeros).div_ceil(POINTS).max(1))

@@ -175,7 +175,7 @@ fn play_is_seen_beside_elasticity() {
         .iter()
         .find(|e| e.effect == "backlash")
         .expect("play");
-    near(play.value, 1.5e-3, 0.1);
+    near(play.value, 1.5e-3, 0.03);
     let spring = s
         .seen
         .iter()

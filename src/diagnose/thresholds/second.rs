@@ -17,8 +17,8 @@ pub struct Second {
     /// Gain beside it up to which another effect could stand in its place. Unit: ratio to the standard error. Source:
     /// two standard errors.
     pub rival: f64,
-    /// Transmitted torque at which play has closed to 76 %, over the root mean square of that torque. Unit: share.
-    /// Source: by hand.
+    /// Transmitted torque below which the side of the play is not known, over the root mean square of that torque.
+    /// Unit: share. Source: by hand.
     pub closed: f64,
     /// Proportion of the two positions, beyond 1, above which their scale is doubted. Unit: share. Source: by hand.
     pub scale: f64,
@@ -31,6 +31,6 @@ pub(super) const SECOND: Second = Second {
     gain: 3.1,
     share: 0.02,
     rival: 2.0,
-    closed: 0.05,
+    closed: 0.2,
     scale: 1e-3,
 };
