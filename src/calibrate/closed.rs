@@ -111,8 +111,8 @@ impl Model<'_> {
         let [s, t] = measured.std;
         let weights = [s, s, s, t, t, t].map(|v| 1.0 / (v * self.noise));
         let r = [gap.x, gap.y, gap.z, e.x, e.y, e.z];
-        for i in 0..j.nrows() {
-            j.row_mut(i).scale_mut(weights[i]);
+        for (mut row, weight) in j.row_iter_mut().zip(weights) {
+            row.scale_mut(weight);
         }
         Some(Block {
             r: DVector::from_fn(j.nrows(), |i, _| r[i] * weights[i]),

@@ -156,7 +156,7 @@ mod tests {
         let v = |k: usize| (0.1 * (k / 3) as f64).sin();
         let noise = |k: usize| 1e-5 * ((k * 7919 % 1000) as f64 / 500.0 - 1.0);
         let late: Vec<f64> = (0..900).map(|k| 2e-3 * v(k) + noise(k)).collect();
-        let (errors, delay) = super::errors(&[late.clone()], &|_, k| v(k)).unwrap();
+        let (errors, delay) = super::errors(std::slice::from_ref(&late), &|_, k| v(k)).unwrap();
         assert!((delay.unwrap() - 2e-3).abs() < 1e-4 && errors[0].rms < 1e-5);
         let off: Vec<f64> = late.iter().map(|r| r + 1e-3).collect();
         let (errors, _) = super::errors(&[off], &|_, k| v(k)).unwrap();

@@ -27,7 +27,7 @@ pub(super) fn second_encoder(d: &Diagnosis) -> Markup {
         p { "The deflection of a joint is the position of the link less that of the motor, " code { "ql - q" } ". It shows what lies \
              between them without any model of friction. Zeros, a delay between the encoders and their scale are \
              estimated along and left out here." }
-        (table(&["joint", "deflection, rms", "what it shows", "predicted on holdout", "left"], &[2], &rows))
+        (table(&["joint", "deflection, rms", "what it shows (± at 95 %)", "predicted on holdout", "left"], &[2], &rows))
         (figure(svg, legend(&[(Colour::BLUE, Shape::Dots, "deflection"), (Colour::ORANGE, Shape::Dots, "left by what was found")])))
         @for s in &d.second_encoder {
             @for why in &s.unasked { p { small { (s.joint) ": " (why) "." } } }
@@ -54,7 +54,7 @@ fn panel(d: &Diagnosis, s: &SecondEncoder) -> Panel {
 fn row(s: &SecondEncoder) -> Vec<Markup> {
     let milli = |x: f64| format!("{} m{}", significant(1e3 * x, 3), s.unit);
     let one = |e: &Seen| {
-        let (value, std) = (significant(e.value, 3), significant(e.std, 1));
+        let (value, std) = (significant(e.value, 3), significant(1.96 * e.std, 1));
         let alike = e.same.join(" or ").replace('_', " ");
         html! {
             div { (e.effect.replace('_', " ")) ": " (value) " ± " (std) " " (e.unit)

@@ -165,8 +165,8 @@ pub fn build(seed: u64, plan: &Plan) -> Case {
                 Some("leg_inertia") => without_legs(&clean, r, &wander, log.t[i]),
                 _ => real_force(&clean, &Extra::default(), r, &wander, start, log.t[i]),
             };
-            for j in 0..6 {
-                added[j] += (truth.force[j] - without.force[j]).powi(2);
+            for (sum, (a, b)) in added.iter_mut().zip(truth.force.iter().zip(&without.force)) {
+                *sum += (a - b).powi(2);
             }
             count += 1.0;
         }
@@ -228,8 +228,8 @@ fn real_force(m: &Machine, extra: &Extra, r: &Record, wander: &[Sine], start: f6
         }
     }
     let mut out = hexapod::forces(&m.legs, &motion(m, r, wander, t), &bodies, m.rubs, push);
-    for j in 0..6 {
-        out.force[j] = m.drives[j].logged(out.force[j], out.rate[j]);
+    for (j, drive) in m.drives.iter().enumerate() {
+        out.force[j] = drive.logged(out.force[j], out.rate[j]);
     }
     if let Some((leg, frequency, size)) = extra.hum {
         out.force[leg] += size * (std::f64::consts::TAU * frequency * (start + t)).sin();
