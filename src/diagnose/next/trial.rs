@@ -43,8 +43,7 @@ impl<'a> Placed<'a> {
             effect: effect.as_ref(),
             place: &f.place,
             shape: &f.shape,
-            // coefficients of directions that the records choose are of these records alone
-            eta: (effect.prior() == 0.0).then_some(&f.eta[..]),
+            eta: Some(&f.eta),
         })
     }
 
