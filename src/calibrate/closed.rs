@@ -10,12 +10,11 @@
 //! in base axes. Nothing tells where the base of both stands, nor, of an unknown grip, how large all lengths are.
 
 use super::file::Calibration;
-use super::frame::{Frame, left_jacobian_inverse, log, nearest_rotation, right_jacobian};
+use super::frame::{Frame, left_jacobian_inverse, log, middle, nearest_rotation, right_jacobian};
 use super::kin::Kin;
 use super::kind::Kind;
 use super::model::{Block, Model};
 use super::serial::Posed;
-use super::start::median;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// Rounds of leaving out the closures that fit least.
@@ -142,14 +141,14 @@ pub fn start(
     }
     let relative: Vec<Frame> = pairs.iter().map(|(a, b)| a.inverse().then(b)).collect();
     let shifts: Vec<Vector3<f64>> = relative.iter().map(|f| f.p).collect();
-    let middle = median(&shifts);
+    let centre = middle(&shifts);
     // turns of the half that is nearest to the middle
     let mut near: Vec<&Frame> = relative.iter().collect();
-    near.sort_by(|f, g| (f.p - middle).norm().total_cmp(&(g.p - middle).norm()));
+    near.sort_by(|f, g| (f.p - centre).norm().total_cmp(&(g.p - centre).norm()));
     near.truncate(near.len().div_ceil(2));
     let sum: Matrix3<f64> = near.iter().map(|f| f.r).sum();
     let r = nearest_rotation(&sum).map_or(Matrix3::identity(), |r| r.0);
-    (Frame { r, p: middle }, Vector3::zeros())
+    (Frame { r, p: centre }, Vector3::zeros())
 }
 
 /// `p_a + R_a z = p_b + R_b c` by least squares, the worst third left out in turn.

@@ -139,6 +139,19 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Option<(Matrix3<f64>, bool)> {
     Some((u * d * vt, mirrored))
 }
 
+/// The median of points, coordinate by coordinate; zero of none.
+pub fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|k, _| {
+        let mut c: Vec<f64> = points.iter().map(|p| p[k]).collect();
+        c.sort_by(f64::total_cmp);
+        match c.len() {
+            0 => 0.0,
+            n if n % 2 == 1 => c[n / 2],
+            n => 0.5 * (c[n / 2 - 1] + c[n / 2]),
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,10 +1,9 @@
 //! Errors of all rows, and which of them do not belong to the rest.
 
-use super::frame::log;
+use super::frame::{log, middle};
 use super::kind::Kind;
 use super::model::Model;
 use super::row::Value;
-use super::start::median;
 use nalgebra::Vector3;
 
 /// Mean, median, root mean square, 95th percentile and maximum of errors.
@@ -75,7 +74,7 @@ pub fn errors(model: &Model, x: &[f64]) -> Errors {
                     .collect();
                 let points: Vec<Vector3<f64>> = at.iter().map(|p| p.1).collect();
                 let mean = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-                let centre = median(&points);
+                let centre = middle(&points);
                 for (i, p) in at {
                     out.distance[i] = (p - mean).norm();
                     out.robust[i] = (p - centre).norm();

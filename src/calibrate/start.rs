@@ -6,7 +6,7 @@
 //! the worst third of the rows.
 
 use super::file::Calibration;
-use super::frame::{Frame, log, nearest_rotation};
+use super::frame::{Frame, log, middle, nearest_rotation};
 use super::kin::Kin;
 use super::kind::Kind;
 use super::layout::Start;
@@ -342,7 +342,7 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
             .collect();
         let points: Vec<Vector3<f64>> = own.iter().map(|p| p.0).collect();
         if measured.kind == Kind::Point {
-            start.socket[m] = median(&points);
+            start.socket[m] = middle(&points);
             continue;
         }
         let (mean, _) = spread(points.iter().copied());
@@ -365,17 +365,4 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
         start.plane[m] = (normal, offset);
     }
     Ok(start)
-}
-
-/// Coordinate by coordinate.
-pub fn median(points: &[Vector3<f64>]) -> Vector3<f64> {
-    Vector3::from_fn(|k, _| {
-        let mut c: Vec<f64> = points.iter().map(|p| p[k]).collect();
-        c.sort_by(f64::total_cmp);
-        match c.len() {
-            0 => 0.0,
-            n if n % 2 == 1 => c[n / 2],
-            n => 0.5 * (c[n / 2 - 1] + c[n / 2]),
-        }
-    })
 }

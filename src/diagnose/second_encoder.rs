@@ -213,13 +213,9 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
         Some(all.iter().sum::<f64>() / blocks.rows() as f64)
     };
     let (before, after) = (mean(&base)?, mean(&set)?);
-    let (base_x, base_std) = blocks.estimate(&base)?;
-    let (known_x, known_std) = match chosen.is_empty() {
-        true => (&base_x, &base_std),
-        false => (&x, &std),
-    };
+    let base_x = blocks.fit(&base, None)?;
     let mut seen = Vec::new();
-    for (n, &c) in chosen.iter().enumerate() {
+    for &c in &chosen {
         let others: Vec<usize> = chosen.iter().copied().filter(|o| *o != c).collect();
         let without = joined(&base, &groups, &others);
         let same = groups
@@ -241,10 +237,7 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
             value,
             std,
             unit,
-            share: match n {
-                _ if before <= 0.0 => 0.0,
-                _ => (mean(&without)? - after) / before,
-            },
+            share: (mean(&without)? - after) / before,
             same: same.map(|(_, g)| g.effect).collect(),
         });
     }
@@ -299,8 +292,8 @@ fn look(data: &Data, j: usize, torque: &[f64]) -> Option<SecondEncoder> {
         unit: if turns { "rad" } else { "m" },
         rms: before.sqrt(),
         left: after.sqrt(),
-        delay: [-known_x[zeros], known_std[zeros]],
-        scale: [known_x[zeros + 1], known_std[zeros + 1]],
+        delay: [-x[zeros], std[zeros]],
+        scale: [x[zeros + 1], std[zeros + 1]],
         seen,
         unasked,
         holdout,
