@@ -393,7 +393,7 @@ fn stated_deviations_cover_the_errors() {
     }
     let coverage = inside as f64 / all as f64;
     println!("coverage of 95 %: {coverage:.3}");
-    assert!((0.86..1.0).contains(&coverage), "{coverage}");
+    assert!((0.88..1.0).contains(&coverage), "{coverage}");
 }
 
 #[test]
@@ -692,5 +692,5 @@ fn constant_forces_are_shared_where_the_records_allow_it() {
     println!("coverage of 95 %: {coverage:.3}; shared {shared} of 3");
     // chance may show a drift that is not there; it is then a small one
     assert!(shared >= 2, "{shared}");
-    assert!((0.88..1.0).contains(&coverage), "{coverage}");
+    assert!((0.9..1.0).contains(&coverage), "{coverage}");
 }
