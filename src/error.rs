@@ -169,6 +169,8 @@ warning_kinds! {
     UnitSuspect = "unit_suspect",
     /// What a log is stated to be does not fit the robot.
     LogSuspect = "log_suspect",
+    /// Measured poses contradict the geometry of the robot file by more than their noise.
+    PoseContradicts = "pose_contradicts",
     /// A joint does not move in a log.
     JointNotMoving = "joint_not_moving",
     /// The stated period does not hold, or is too short or too long for the record.

@@ -56,7 +56,7 @@ pub fn tighten(data: &mut Data, effects: &[Box<dyn Effect>]) -> crate::error::Re
 /// The factors that the records find likeliest.
 fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Closeness {
     let data = evidence.data;
-    let sets: Vec<_> = effects
+    let sets: Vec<(f64, Vec<_>)> = effects
         .iter()
         .filter(|e| e.hides())
         .flat_map(|e| {
@@ -64,17 +64,20 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
                 let shapes = e.shapes(cx, &place);
                 shapes
                     .into_iter()
-                    .map(move |shape| e.columns(cx, &place, &shape, true))
+                    .map(move |shape| (e.prior(), e.columns(cx, &place, &shape, true)))
             })
         })
-        .filter(|c| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()))
+        .filter(|(_, c)| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()))
         .collect();
+    let (priors, sets): (Vec<f64>, Vec<_>) = sets.into_iter().unzip();
     let samples = (data.fitted * data.joints()) as f64;
     let level = (evidence.j0 / samples).max(1.0);
-    let projected: Vec<Projected> = sets
+    let mut projected: Vec<Projected> = sets
         .par_chunks(8)
         .flat_map_iter(|c| evidence.project_all(c))
         .collect();
+    let of = projected.iter_mut().zip(priors);
+    of.for_each(|(p, prior)| p.prior = prior);
     let [gram, pull] = evidence.normal_equations();
     let reduced = Reduced {
         gram: gram * (1.0 / level),

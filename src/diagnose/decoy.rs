@@ -77,7 +77,8 @@ pub fn largest(
     let all: Vec<f64> = shifts().collect();
     let some = |shifts: &[f64]| {
         let sets: Vec<Vec<Column>> = shifts.iter().map(|s| of(*s)).collect();
-        let decoys = evidence.project_all(&sets);
+        let mut decoys = evidence.project_all(&sets);
+        decoys.iter_mut().for_each(|d| d.prior = projected.prior);
         decoys.iter().map(excess).fold(0.0, f64::max)
     };
     all.chunks((12 / columns.len().max(1)).max(1))

@@ -39,6 +39,8 @@ pub struct Projected {
     pub s: Mat<f64>,
     /// `b = ZᵀRr`
     pub b: Vec<f64>,
+    /// information a priori on every coefficient
+    pub prior: f64,
 }
 
 impl Projected {
@@ -155,7 +157,9 @@ impl Evidence<'_> {
     pub fn as_seen(&self, a: &Projected) -> [Mat<f64>; 3] {
         let absorbed = a.c.transpose() * faer::ColRef::from_slice(&self.d).as_mat();
         let with = Mat::from_fn(a.b.len(), 1, |i, _| a.b[i] + absorbed[(i, 0)]);
-        [&self.l * &a.c, a.raw.clone(), with]
+        let mut own = a.raw.clone();
+        (0..a.b.len()).for_each(|i| own[(i, i)] += a.prior);
+        [&self.l * &a.c, own, with]
     }
 
     /// Whitens and reduces columns.
@@ -223,7 +227,14 @@ impl Evidence<'_> {
                         (s[(i, m)], s[(m, i)]) = (full - absorbed, full - absorbed);
                     }
                 }
-                Projected { z, c, raw, s, b }
+                Projected {
+                    z,
+                    c,
+                    raw,
+                    s,
+                    b,
+                    prior: 0.0,
+                }
             })
             .collect()
     }
@@ -261,7 +272,7 @@ impl Evidence<'_> {
             }
             // what is not visible must not be fitted: a ridge far below anything visible
             for x in 0..sizes[i] {
-                s[(at + x, at + x)] += 1e-7 * a.raw[(x, x)] + 1e-9;
+                s[(at + x, at + x)] += 1e-7 * a.raw[(x, x)] + 1e-9 + a.prior;
             }
             b.extend(a.b.iter().copied());
             at += sizes[i];

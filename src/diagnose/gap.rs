@@ -42,15 +42,21 @@ pub struct Shares {
 /// Energy of a whitened residual above the noise in one record of one actuator: what repeats, and
 /// what does not. The residual is zero where nothing was measured or the actuator stood.
 pub fn excess(record: &Series, j: usize, e: &[f64]) -> (f64, f64) {
+    let [a, b, _] = parts(record, j, e);
+    (a, b)
+}
+
+/// The same, and the variance of a row between periods (1 where nothing repeats).
+fn parts(record: &Series, j: usize, e: &[f64]) -> [f64; 3] {
     let counted = record.counted(j);
     let sound = record.counts(j);
     let n = sound as f64;
     if sound == 0 {
-        return (0.0, 0.0);
+        return [0.0, 0.0, 1.0];
     }
     let Some(cycle) = record.cycle else {
         let total: f64 = e.iter().map(|v| v * v).sum();
-        return ((total - n).max(-T.measure.negative * n), 0.0);
+        return [(total - n).max(-T.measure.negative * n), 0.0, 1.0];
     };
     let periods = record.periods() as f64;
     let mean = record.period_mean(j, e);
@@ -88,7 +94,7 @@ pub fn excess(record: &Series, j: usize, e: &[f64]) -> (f64, f64) {
         None => 0.0,
     };
     let broad = (variance - T.measure.broad).max(0.0) * n;
-    (repeating, slow.max(broad))
+    [repeating, slow.max(broad), variance]
 }
 
 /// Gap energy by actuator over the records that `pick` takes, in units of the noise variance; what
@@ -103,8 +109,14 @@ pub fn energies(
             let mut sum = [0.0; 2];
             for (k, r) in data.records.iter().enumerate() {
                 if pick(r) {
-                    let (a, b) = excess(r, j, &residual[j][data.span(k)]);
-                    sum[0] += a - data.noise[j].excess * r.counts(j) as f64;
+                    let [a, b, variance] = parts(r, j, &residual[j][data.span(k)]);
+                    // of a closed chain, what differs between periods is taken off already
+                    let differs = match data.plant.closed() {
+                        true => (variance - 1.0).max(0.0),
+                        false => 0.0,
+                    };
+                    let same = (data.noise[j].excess - differs).max(0.0);
+                    sum[0] += a - same * r.counts(j) as f64;
                     sum[1] += b;
                 }
             }

@@ -111,6 +111,25 @@ impl Data<'_> {
         e
     }
 
+    /// A residual of an actuator in record `k`, and how many of its rows count. At reversals the drives of a closed
+    /// chain may stick: those rows have no weight, and their peaks are of all frequencies.
+    fn away_from_reversals<'r>(
+        &self,
+        j: usize,
+        k: usize,
+        residual: &'r [f64],
+    ) -> (Cow<'r, [f64]>, f64) {
+        let span = self.span(k);
+        let piece = &residual[span.clone()];
+        if !self.plant.closed() {
+            return (Cow::Borrowed(piece), self.records[k].counts(j) as f64);
+        }
+        let rows = piece.iter().zip(&self.weights[j][span]);
+        let kept: Vec<f64> = rows.map(|(v, w)| if *w > 0.0 { *v } else { 0.0 }).collect();
+        let count = kept.iter().filter(|v| **v != 0.0).count();
+        (Cow::Owned(kept), count as f64)
+    }
+
     /// The same limited by what a residual shows.
     pub fn limit_excess(&mut self, residual: &[Vec<f64>]) {
         for j in 0..self.joints() {
@@ -131,11 +150,11 @@ impl Data<'_> {
                 if !self.records[k].fit {
                     continue;
                 }
-                let piece = &residual[j][self.span(k)];
-                for (s, v) in seen.iter_mut().zip(spectrum(piece)) {
+                let (piece, counts) = self.away_from_reversals(j, k, &residual[j]);
+                for (s, v) in seen.iter_mut().zip(spectrum(&piece)) {
                     *s += v * piece.len() as f64;
                 }
-                weight += self.records[k].counts(j) as f64;
+                weight += counts;
             }
             let possible = self.position_excess(j);
             let excess: Vec<f64> = (0..=LINES)

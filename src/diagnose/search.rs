@@ -55,7 +55,8 @@ fn try_shape(
     if columns.is_empty() || columns.iter().any(|c| c.rows.is_empty()) {
         return None;
     }
-    let projected = evidence.project(&columns);
+    let mut projected = evidence.project(&columns);
+    projected.prior = effect.prior();
     let mut set = beside.to_vec();
     set.push(&projected);
     let fit = evidence.fit(&set);
@@ -191,9 +192,10 @@ pub fn best_shape(
             return None;
         }
         let mut best: Best = [None, None];
-        for (projected, shape) in evidence.project_all(&sets).iter().zip(shapes) {
+        for (mut projected, shape) in evidence.project_all(&sets).into_iter().zip(shapes) {
+            projected.prior = effect.prior();
             let mut set = beside.to_vec();
-            set.push(projected);
+            set.push(&projected);
             let fit = evidence.fit(&set);
             let eta = &fit.eta[fit.eta.len() - projected.z.len()..];
             let gain = fit.gain - before.gain;

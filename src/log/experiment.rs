@@ -2,6 +2,7 @@
 
 use super::formats::Format;
 use super::layout::Layout;
+use super::pose_check;
 use super::record::Reading;
 use super::{Payload, Purpose, Record};
 use crate::error::{Error, Result, Warning};
@@ -151,6 +152,7 @@ impl Experiment {
                 let mut record =
                     Record::read_as(&logs, &plant, entry.purpose, entry.period, reading)?;
                 record.payload = *payload;
+                record.warnings.extend(pose_check::check(&plant, &record));
                 Ok(record)
             })
             .collect::<Result<Vec<_>>>()?;

@@ -23,6 +23,7 @@ pub(crate) mod layout;
 pub(crate) mod merge;
 pub(crate) mod names;
 pub(crate) mod number;
+mod pose_check;
 pub(crate) mod pressure;
 pub(crate) mod record;
 pub(crate) mod resample;

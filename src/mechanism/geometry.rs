@@ -90,6 +90,16 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn dimensions(&self) -> Option<Dimensions> {
         None
     }
+
+    /// The same with the joints of its legs moved: deviations as [`Dimensions`] has them, those of zeros left out.
+    /// `None` where the bodies of the tree would change with them.
+    #[doc(hidden)]
+    fn deformed(&self, _off: &[f64]) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 }
 
 /// Kinematics of batches, with their derivatives; object-safe. All arrays are sample-fastest:
@@ -128,6 +138,12 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
     /// As [`Kinematics::dimensions`].
     #[doc(hidden)]
     fn dimensions(&self) -> Option<Dimensions> {
+        None
+    }
+
+    /// As [`Kinematics::deformed`].
+    #[doc(hidden)]
+    fn deformed(&self, _off: &[f64]) -> Option<Box<dyn Geometry>> {
         None
     }
 
@@ -418,7 +434,7 @@ impl<K: Kinematics, const M: usize> Pass for CurvaturePass<'_, K, M> {
     }
 }
 
-impl<K: Kinematics, const M: usize> Geometry for ClosedForm<K, M> {
+impl<K: Kinematics + 'static, const M: usize> Geometry for ClosedForm<K, M> {
     fn coordinates(&self) -> usize {
         self.0.coordinates()
     }
@@ -481,5 +497,10 @@ impl<K: Kinematics, const M: usize> Geometry for ClosedForm<K, M> {
     }
     fn dimensions(&self) -> Option<Dimensions> {
         self.0.dimensions()
+    }
+
+    fn deformed(&self, off: &[f64]) -> Option<Box<dyn Geometry>> {
+        let other: Box<dyn Geometry> = Box::new(ClosedForm::<K, M>(self.0.deformed(off)?));
+        Some(other)
     }
 }

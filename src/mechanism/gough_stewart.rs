@@ -18,7 +18,7 @@
 //!
 //! Khalil & Guégan, IEEE Transactions on Robotics 20(4), 2004, give the same model in closed form.
 
-use super::dimensions::{Dimensions, LegChain};
+use super::dimensions::{Dimensions, LEG, LegChain};
 use super::geometry::{ClosedForm, Cone, Coordinates, Kinematics, Segment};
 use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
@@ -314,6 +314,15 @@ impl Kinematics for Kinematic {
             zero: l.zero,
         };
         Some(Dimensions::Legs(self.legs.iter().map(leg).collect()))
+    }
+
+    fn deformed(&self, off: &[f64]) -> Option<Self> {
+        let mut other = self.clone();
+        for (leg, e) in other.legs.iter_mut().zip(off.chunks_exact(LEG.len())) {
+            leg.base += Vector3::new(e[0], e[1], e[2]);
+            leg.platform += Vector3::new(e[3], e[4], e[5]);
+        }
+        Some(other)
     }
 
     fn cones(&self, x: &[f64]) -> Vec<Cone> {

@@ -23,6 +23,7 @@ mod actuators;
 #[doc(hidden)]
 pub mod bundled;
 mod certificate;
+mod deformed;
 #[doc(hidden)]
 pub mod delta;
 pub(crate) mod dimensions;

@@ -2,6 +2,7 @@
 
 use super::base_compliance;
 use super::estimate::{Place, Quantity};
+use super::leg_geometry::Deformations;
 use crate::diagnose::column::Column;
 use crate::diagnose::data::Data;
 use crate::diagnose::thresholds::THRESHOLDS as T;
@@ -29,6 +30,8 @@ pub struct Context<'a> {
     pub mass: Vec<Vec<Vec<f64>>>,
     /// what the robot exerts on its base, once it was asked for
     base: OnceLock<Option<base_compliance::Load>>,
+    /// what other geometry changes, once it was asked for
+    deformations: OnceLock<Option<Deformations>>,
 }
 
 impl<'a> Context<'a> {
@@ -67,6 +70,7 @@ impl<'a> Context<'a> {
             peak,
             mass,
             base: OnceLock::new(),
+            deformations: OnceLock::new(),
         })
     }
 
@@ -74,6 +78,13 @@ impl<'a> Context<'a> {
     pub(crate) fn base(&self) -> Option<&base_compliance::Load> {
         self.base
             .get_or_init(|| base_compliance::Load::of(self))
+            .as_ref()
+    }
+
+    /// What deviations of the legs change (hexapods).
+    pub(crate) fn deformations(&self) -> Option<&Deformations> {
+        self.deformations
+            .get_or_init(|| Deformations::of(self))
             .as_ref()
     }
 

@@ -21,6 +21,7 @@ mod gravity_direction;
 mod joint_coupling;
 mod joint_elasticity;
 mod joint_offset;
+mod leg_geometry;
 mod leg_inertia;
 mod link_inertia;
 mod load_dependent_friction;
@@ -103,6 +104,11 @@ pub trait Effect: Sync {
     fn hides(&self) -> bool {
         false
     }
+    /// Information a priori on every coefficient, where these are in units of their deviations: 1; 0 where nothing is
+    /// known of them.
+    fn prior(&self) -> f64 {
+        0.0
+    }
     /// Whether it moves links against what the encoders read, by a way that the inertia of the model decides.
     fn sways(&self) -> bool {
         false
@@ -182,6 +188,7 @@ pub fn all() -> Vec<Box<dyn Effect>> {
         Box::new(encoder_eccentricity::EncoderEccentricity),
         Box::new(passive_joint_friction::PassiveJointFriction),
         Box::new(leg_inertia::LegInertia),
+        Box::new(leg_geometry::LegGeometry),
     ]
 }
 

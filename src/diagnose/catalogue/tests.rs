@@ -134,6 +134,7 @@ fn sizes(name: &str, cx: &Context, columns: &[Column]) -> Vec<f64> {
         "joint_offset" | "gravity_direction" | "encoder_eccentricity" => {
             [0.004, -0.003][..n].to_vec()
         }
+        "leg_geometry" => vec![0.2; n],
         "passive_joint_friction" => vec![0.02, 0.05],
         "joint_elasticity" | "backlash" | "torque_delay" => vec![1.0],
         _ => {

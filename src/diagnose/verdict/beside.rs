@@ -76,7 +76,8 @@ impl<'a> Beside<'a> {
         // what an effect explains of the residual may be too little to judge it by, although its
         // parameters stand out
         let faint = out.in_rows() * out.matters < T.hidden.faint;
-        let little = (T.hidden.of_gain * out.gain).max(T.hidden.of_entry * T.entry.gain * rows);
+        let little =
+            (T.hidden.of_gain * out.gain).max(T.hidden.of_entry * st.scale() * T.entry.gain * rows);
         // nor is a residual that hardly falls, where most of what is unlikely of the parameters goes
         let free = st.evidence.data.parameters.len() as f64;
         let unlikely = (surprise_without - free).max(1.0);
@@ -108,7 +109,10 @@ impl<'a> Beside<'a> {
     }
 
     fn in_rows(&self) -> f64 {
-        T.confidence.gain.above(self.gain_in_rows() / self.fitted())
+        T.confidence
+            .gain
+            .scaled(self.st.scale())
+            .above(self.gain_in_rows() / self.fitted())
     }
 
     /// Whether the gain is large enough, 0 to 1.

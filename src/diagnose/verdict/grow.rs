@@ -134,7 +134,8 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let hold = fall(data.fitted..data.rows());
     let gap = st.gap(&r0, true);
     let there: f64 = st.joints_of(&set[i]).iter().map(|j| gap[*j].max(0.0)).sum();
-    let significant = visible > T.entry.gain * rows && visible > T.entry.of_gap * there;
+    let significant =
+        visible > st.scale() * T.entry.gain * rows && visible > T.entry.of_gap * there;
     // as much a row as on the fitted records, or, where the holdout moves less, as much as predicted
     let predicted = predicts(data, &r0, &r1);
     let generalises = held == 0

@@ -61,7 +61,10 @@ pub fn judge(
     // whole sets of inertial parameters fit anything in a single record
     let unsteady = match st.remembers(c) || m.frozen && columns.len() > T.hidden.columns {
         true => None,
-        false => unsteady(evidence, &columns, &beside, m.with.gain, m.gain),
+        false => {
+            let with = (columns.as_slice(), effect.prior());
+            unsteady(evidence, with, &beside, m.with.gain, m.gain)
+        }
     };
     let together = together(&m, &rivals, decoys, unsteady);
     Member {

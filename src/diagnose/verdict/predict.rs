@@ -37,7 +37,7 @@ fn taken_and_fall(r0: &[Vec<f64>], r1: &[Vec<f64>], rows: Range<usize>) -> [f64;
 /// in every record. `None` with one record.
 pub fn unsteady(
     evidence: &Evidence,
-    columns: &[Column],
+    (columns, prior): (&[Column], f64),
     beside: &[&Projected],
     together: f64,
     own: f64,
@@ -63,7 +63,8 @@ pub fn unsteady(
         .iter()
         .map(|k| columns.iter().map(|c| only(c, *k)).collect())
         .collect();
-    let projected = evidence.project_all(&apart);
+    let mut projected = evidence.project_all(&apart);
+    projected.iter_mut().for_each(|p| p.prior = prior);
     let mut set = beside.to_vec();
     set.extend(&projected);
     let freedoms = ((fitted.len() - 1) * columns.len()) as f64;

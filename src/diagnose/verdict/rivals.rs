@@ -118,11 +118,12 @@ pub fn rivals(m: &Beside, list: &[Candidate]) -> Vec<Rival> {
         let least = -T.rivals.better * left;
         let by_left = (left / (left + less.max(least))).powf(T.rivals.by_left);
         if loss < T.rivals.loss {
+            let by_rows = in_rows(m, &r).unwrap_or(f64::INFINITY);
             rivals.push(Rival {
                 effect: r.effect,
                 place: r.place,
                 loss,
-                weight: by_gain.min(by_left).min(T.rivals.most),
+                weight: by_gain.min(by_left).min(by_rows).min(T.rivals.most),
                 shape: r.shape.clone(),
                 eta: r.eta.clone(),
             });
@@ -130,6 +131,23 @@ pub fn rivals(m: &Beside, list: &[Candidate]) -> Vec<Rival> {
     }
     rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     rivals
+}
+
+/// Weight of a rival of an effect that shows in the parameters of a closed chain by what it leaves of the residual: a body
+/// anywhere may stand for the parameters, and leave what moves otherwise.
+fn in_rows(m: &Beside, r: &Candidate) -> Option<f64> {
+    let st = m.st;
+    if !(m.frozen && st.evidence.data.plant.closed()) {
+        return None;
+    }
+    let mut both = m.set.to_vec();
+    both.push(r.clone());
+    let instead = r.gain - (st.gain(&both) - m.with.gain);
+    let own = merit_of(st, m.member, m.gain, price(st));
+    let less = own - merit_of(st, r, instead, price(st));
+    let left = m.energy_left() + T.rivals.left;
+    let least = -T.rivals.better * left;
+    Some((left / (left + less.max(least))).powf(T.rivals.by_left))
 }
 
 /// Merit of a rival by what it gains in place of the member, not what it would gain beside it.

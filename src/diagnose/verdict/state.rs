@@ -46,6 +46,14 @@ impl<'a> State<'a> {
 }
 
 impl State<'_> {
+    /// Factor on what counts per row.
+    pub fn scale(&self) -> f64 {
+        match self.evidence.data.plant.closed() {
+            true => T.matters.closed,
+            false => 1.0,
+        }
+    }
+
     /// By how much `χ²` falls with a set.
     pub fn gain(&self, set: &[Candidate]) -> f64 {
         let set: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
@@ -127,7 +135,7 @@ impl State<'_> {
         };
         T.matters.of_joints.above(seen)
             * T.matters.of_all.above(explains)
-            * T.matters.gap.above(there)
+            * T.matters.gap.scaled(self.scale()).above(there)
             * ringing
     }
 }

@@ -1,0 +1,117 @@
+//! Forces of legs whose joints are not where the file says, along one and the same motion of the actuators.
+//!
+//! With `q = F(x; g)` the geometry `g` moves the platform at a given reading of the actuators and turns the legs:
+//!
+//! ```text
+//! F_a(x'; g + δg) = q_a + δzero     F'ẋ' = q̇_a     F'ẍ' + F'_xx[ẋ', ẋ'] = q̈_a     δτ = τ(x'; g + δg) − τ(x; g)
+//! ```
+//!
+//! The bodies of a leg feel its length and its angles alone, so the tree stays as it is. Changes are central
+//! differences; `x'` is found by Newton's method.
+
+use super::dimensions::LEG;
+use super::{Mechanism, Source};
+use crate::dynamics::{Samples, Workspace};
+use crate::error::Result;
+use std::sync::Arc;
+
+/// Half of the difference that a derivative is taken from, m.
+const STEP: f64 = 1e-5;
+/// Steps of Newton's method from the pose of the nominal geometry: the second is below rounding.
+const NEWTON: usize = 2;
+
+impl Mechanism {
+    /// How many deviations of its legs [`Mechanism::deformations`] knows: [`LEG`] of each, none for other mechanisms.
+    pub(crate) fn deviations(&self) -> usize {
+        match (&self.source, self.actuators() == self.freedoms()) {
+            (Source::GoughStewart, true) => LEG.len() * self.actuators(),
+            _ => 0,
+        }
+    }
+
+    /// Change of the actuator forces per unit of each deviation, in the order of [`LEG`], leg after leg: entry `a·count + s`
+    /// for actuator `a` and sample `s`, N/m. `bodies` are the inertial parameters of all bodies of the tree.
+    ///
+    /// # Errors
+    /// Poses that cannot be reached.
+    pub(crate) fn deformations(&self, x: &Samples, bodies: &[f64]) -> Result<Vec<Vec<f64>>> {
+        let nominal = self.motion(x)?;
+        let read = |of: &[f64]| -> Vec<Vec<f64>> {
+            let row = |j: &usize| of[j * x.count..(j + 1) * x.count].to_vec();
+            self.actuated.iter().map(row).collect()
+        };
+        let actuators = [&nominal.tree.q, &nominal.tree.qd, &nominal.tree.qdd].map(|of| read(of));
+        let (n, parts) = (self.deviations(), LEG.len());
+        let mut all = Vec::with_capacity(n);
+        for k in 0..n {
+            let side = |step: f64| {
+                let mut shift = [0.0; 7];
+                shift[k % parts] = step;
+                self.deformed(x, &actuators, k / parts, &shift, bodies)
+            };
+            let (plus, minus) = (side(STEP)?, side(-STEP)?);
+            let pairs = plus.iter().zip(&minus);
+            all.push(pairs.map(|(p, m)| (p - m) / (2.0 * STEP)).collect());
+        }
+        Ok(all)
+    }
+
+    /// Forces with one leg off, at the same motion of the actuators.
+    fn deformed(
+        &self,
+        x: &Samples,
+        actuators: &[Vec<Vec<f64>>; 3],
+        leg: usize,
+        shift: &[f64; 7],
+        bodies: &[f64],
+    ) -> Result<Vec<f64>> {
+        let mut other = self.clone();
+        let mut off = vec![0.0; self.deviations()];
+        off[LEG.len() * leg..LEG.len() * (leg + 1)].copy_from_slice(shift);
+        if let Some(geometry) = self.geometry.deformed(&off) {
+            other.geometry = Arc::from(geometry);
+        }
+        let (na, m, count) = (self.actuators(), self.freedoms(), x.count);
+        // `D_a⁻¹` times what the actuators lack
+        let solved = |a: &[f64], lack: &dyn Fn(usize, usize) -> f64, to: &mut [f64], add: bool| {
+            for k in 0..m {
+                for s in 0..count {
+                    let sum: f64 = (0..na)
+                        .map(|j| a[(k * na + j) * count + s] * lack(j, s))
+                        .sum();
+                    let to = &mut to[k * count + s];
+                    *to = if add { *to + sum } else { sum };
+                }
+            }
+        };
+        let at = |of: &[f64], j: usize, s: usize| of[self.actuated[j] * count + s];
+        let mut y = x.clone();
+        for _ in 0..NEWTON {
+            let now = other.motion(&y)?;
+            let lack = |j: usize, s: usize| {
+                let zero = if j == leg { shift[6] } else { 0.0 };
+                actuators[0][j][s] + zero - at(&now.tree.q, j, s)
+            };
+            solved(&now.a, &lack, &mut y.q, true);
+        }
+        let now = other.motion(&y)?;
+        solved(&now.a, &|j, s| actuators[1][j][s], &mut y.qd, false);
+        y.qdd.fill(0.0);
+        let now = other.motion(&y)?;
+        let lack = |j: usize, s: usize| actuators[2][j][s] - at(&now.tree.qdd, j, s);
+        solved(&now.a, &lack, &mut y.qdd, false);
+        let motion = other.motion(&y)?;
+        let mut gamma = vec![0.0; motion.tree.dof * count];
+        let ws = &mut Workspace::default();
+        self.tree
+            .inverse_dynamics(ws, bodies, &motion.tree, &mut gamma);
+        Ok(other.project(&motion, &gamma))
+    }
+
+    /// Inertial parameters of all bodies of the tree with `phi` in place of the unknowns, ten a body.
+    pub(crate) fn bodies_with(&self, phi: &[f64]) -> Vec<f64> {
+        let mut all = Vec::new();
+        self.tree_phi(&self.parameters.expand(phi), true, &mut all);
+        all
+    }
+}
