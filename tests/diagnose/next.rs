@@ -129,8 +129,20 @@ fn told(before: &Diagnosis, after: &Diagnosis, n: &Proposal) -> [[f64; 2]; 2] {
 
 #[test]
 fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
-    let effect = Some((Field::Stribeck, "leg2=60,0.18"));
-    let mut case = Case::new("hexapod", effect, 1.0, 0.4, None);
+    // what more of it, and less noise, show without another motion
+    let named = |text: &str| {
+        let effect = Some((Field::Stribeck, text));
+        let d = Case::new("hexapod", effect, 1.0, 0.4, None).diagnose(false, 0);
+        let claims: Vec<_> = (d.findings.iter())
+            .filter(|f| f.is_claim())
+            .map(|f| (f.effect, f.joints[0].clone(), f.confidence > 0.8))
+            .collect();
+        assert_eq!(claims, [("stribeck_friction", "leg2".into(), true)]);
+    };
+    named("leg2=60,0.18");
+    named("leg2=40,0.18");
+    let effect = Some((Field::Stribeck, "leg2=30,0.15"));
+    let mut case = Case::new("hexapod", effect, 1.5, 0.4, None);
     let (before, n) = case.propose();
     assert_eq!(
         n.separates,

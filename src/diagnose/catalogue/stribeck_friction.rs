@@ -22,7 +22,7 @@ impl Effect for StribeckFriction {
 
     fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
         let v = cx.data.speed[place.first()];
-        let grid = ladder(0.006 * v, 0.2 * v, 9);
+        let grid = ladder(0.006 * v, 0.31 * v, 10);
         let with = |d: f64| grid.iter().map(move |v| Shape::of(&[*v, d]));
         with(1.0).chain(with(2.0)).collect()
     }
