@@ -5,33 +5,33 @@ use std::path::Path;
 use tempfile::TempDir;
 
 /// One run in an empty directory of its own.
-struct Test {
+pub struct Test {
     dir: TempDir,
 }
 
-struct Outcome {
-    status: i32,
-    stdout: String,
-    stderr: String,
+pub struct Outcome {
+    pub status: i32,
+    pub stdout: String,
+    pub stderr: String,
 }
 
 impl Test {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Test {
             dir: tempfile::tempdir().unwrap(),
         }
     }
 
-    fn file(self, name: &str, content: impl AsRef<[u8]>) -> Self {
+    pub fn file(self, name: &str, content: impl AsRef<[u8]>) -> Self {
         std::fs::write(self.dir.path().join(name), content).unwrap();
         self
     }
 
-    fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         self.dir.path()
     }
 
-    fn run(&self, line: &str) -> Outcome {
+    pub fn run(&self, line: &str) -> Outcome {
         let out = Command::cargo_bin("excite")
             .unwrap()
             .current_dir(self.path())
@@ -47,7 +47,7 @@ impl Test {
     }
 
     /// Runs a line that must fail with this status and one message that holds all the words.
-    fn fails(&self, line: &str, status: i32, words: &[&str]) {
+    pub fn fails(&self, line: &str, status: i32, words: &[&str]) {
         let out = self.run(line);
         assert_eq!(out.status, status, "{line}\n{}", out.stderr);
         assert!(!out.stderr.contains("panicked"), "{line}\n{}", out.stderr);
@@ -61,7 +61,7 @@ impl Test {
         }
     }
 
-    fn json(&self, name: &str) -> serde_json::Value {
+    pub fn json(&self, name: &str) -> serde_json::Value {
         let text = std::fs::read_to_string(self.path().join(name)).unwrap();
         serde_json::from_str(&text).unwrap()
     }

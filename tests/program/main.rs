@@ -8,6 +8,7 @@ mod controller;
 mod dependencies;
 mod documents;
 mod mutations;
+mod pose_check;
 mod rehearsal;
 mod report;
 mod surface;
