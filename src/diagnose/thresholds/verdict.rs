@@ -56,9 +56,9 @@ pub struct Matters {
     /// Gap per row of its own joints, for an effect that rings with damping: what friction at reversals starts
     /// in the loop of the controller rings too. Unit: noise variances. Source: the ladder of seed 5.
     pub ringing: Gate,
-    /// Factor on `entry.gain`, `confidence.gain` and `matters.gap` for closed chains: rows near a reversal have no weight
-    /// there, and what those borders allow for lies in such rows. Unit: ratio. Source: the hexapods of the
-    /// withheld generator, clean ones among them.
+    /// Factor on `entry.gain`, `confidence.gain` and `matters.gap` for closed chains, while one effect stands alone: rows
+    /// near a reversal have no weight there, and what those borders allow for lies in such rows. Unit: ratio. Source: the
+    /// hexapods of the withheld generator, clean ones among them.
     pub closed: f64,
 }
 

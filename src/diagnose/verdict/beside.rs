@@ -56,7 +56,7 @@ impl<'a> Beside<'a> {
         let without = st.gap(&r0, true);
         let surprise_without = st.surprise(&f0, &r0);
         let mut out = Beside {
-            matters: st.matters(member, &without, after),
+            matters: st.matters(member, set.len(), &without, after),
             gain: with.gain - f0.gain,
             fall: surprise_without - surprise_after,
             residual: [r0, r1],
@@ -76,8 +76,8 @@ impl<'a> Beside<'a> {
         // what an effect explains of the residual may be too little to judge it by, although its
         // parameters stand out
         let faint = out.in_rows() * out.matters < T.hidden.faint;
-        let little =
-            (T.hidden.of_gain * out.gain).max(T.hidden.of_entry * st.scale() * T.entry.gain * rows);
+        let little = (T.hidden.of_gain * out.gain)
+            .max(T.hidden.of_entry * st.scale(set.len()) * T.entry.gain * rows);
         // nor is a residual that hardly falls, where most of what is unlikely of the parameters goes
         let free = st.evidence.data.parameters.len() as f64;
         let unlikely = (surprise_without - free).max(1.0);
@@ -111,7 +111,7 @@ impl<'a> Beside<'a> {
     fn in_rows(&self) -> f64 {
         T.confidence
             .gain
-            .scaled(self.st.scale())
+            .scaled(self.st.scale(self.set.len()))
             .above(self.gain_in_rows() / self.fitted())
     }
 

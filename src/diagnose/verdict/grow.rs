@@ -135,7 +135,7 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let gap = st.gap(&r0, true);
     let there: f64 = st.joints_of(&set[i]).iter().map(|j| gap[*j].max(0.0)).sum();
     let significant =
-        visible > st.scale() * T.entry.gain * rows && visible > T.entry.of_gap * there;
+        visible > st.scale(set.len()) * T.entry.gain * rows && visible > T.entry.of_gap * there;
     // as much a row as on the fitted records, or, where the holdout moves less, as much as predicted
     let predicted = predicts(data, &r0, &r1);
     let generalises = held == 0
@@ -143,7 +143,7 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
         || predicted > T.confidence.predicts.centre;
     if significant && generalises {
         let after = st.gap(&r1, true);
-        let worth = st.matters(&set[i], &gap, &after);
+        let worth = st.matters(&set[i], set.len(), &gap, &after);
         let enters =
             worth > T.entry.claimable && (st.remembers(&set[i]) || predicted > T.entry.claimable);
         // one that lives in the parameters is judged by them, if the residual hardly shows it

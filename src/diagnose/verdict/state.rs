@@ -46,9 +46,10 @@ impl<'a> State<'a> {
 }
 
 impl State<'_> {
-    /// Factor on what counts per row.
-    pub fn scale(&self) -> f64 {
-        match self.evidence.data.plant.closed() {
+    /// Factor on what counts per row, for a member of a set of so many. A second name must stand out as on any robot:
+    /// what a first one leaves of a large gap is not all of its shape.
+    pub fn scale(&self, members: usize) -> f64 {
+        match self.evidence.data.plant.closed() && members == 1 {
             true => T.matters.closed,
             false => 1.0,
         }
@@ -117,8 +118,8 @@ impl State<'_> {
 
     /// Whether an effect explains enough to be a finding, 0 to 1, from the gap by actuator without it
     /// and with it. An effect that explains almost nothing is not a finding, nor is one in a gap no larger
-    /// than a sound model leaves.
-    pub fn matters(&self, c: &Candidate, without: &[f64], with: &[f64]) -> f64 {
+    /// than a sound model leaves. `members` are in the set.
+    pub fn matters(&self, c: &Candidate, members: usize, without: &[f64], with: &[f64]) -> f64 {
         let rows = self.evidence.data.fitted as f64;
         let joints = self.joints_of(c);
         let over = |gap: &[f64]| -> f64 {
@@ -135,7 +136,7 @@ impl State<'_> {
         };
         T.matters.of_joints.above(seen)
             * T.matters.of_all.above(explains)
-            * T.matters.gap.scaled(self.scale()).above(there)
+            * T.matters.gap.scaled(self.scale(members)).above(there)
             * ringing
     }
 }
