@@ -7,7 +7,7 @@ use super::identifiable::Identifiability;
 use super::judge::Errors;
 use super::model::Model;
 use super::open::Opened;
-use super::result::GroupResult;
+use super::result::{GroupResult, RowResult};
 use crate::error::{Error, Result, Warning, WarningKind, number};
 use faer::Mat;
 
@@ -129,8 +129,10 @@ pub(super) fn unreached(
     Ok(())
 }
 
-/// Errors that stay in the middle of the rows of a file, m, from which on nothing was identified.
+/// Errors that stay in the middle of the rows of a file, m, from which on nothing was identified,
 const HOPELESS: f64 = 0.05;
+/// unless so many standard deviations of the stated noise are more.
+const NOISY: f64 = 3.0;
 
 /// Rows that no geometry near that of the file explains are an error: what would be written is no robot.
 pub(super) fn hopeless(input: &Calibration, after: &Errors) -> Result<()> {
@@ -141,7 +143,11 @@ pub(super) fn hopeless(input: &Calibration, after: &Errors) -> Result<()> {
             .map(|(_, e)| *e)
             .collect();
         let typical = crate::median::median(own.iter().copied());
-        if typical > HOPELESS {
+        let stated = match input.noise_stated {
+            true => NOISY * measured.std[0],
+            false => 0.0,
+        };
+        if typical > HOPELESS.max(stated) {
             return Err(Error::file(
                 &input.path,
                 measured.file.clone(),
@@ -178,6 +184,32 @@ pub(super) fn suspicious(input: &Calibration, before: &Errors, warnings: &mut Ve
                     crate::error::number((1e3 * typical).round())
                 ),
             ));
+        }
+    }
+}
+
+/// Sound rows from which on their middle says which robot is the better one.
+const ENOUGH: usize = 5;
+
+/// A robot that fits its rows no better than that of the file.
+pub(super) fn worse(rows: &[RowResult], warnings: &mut Vec<Warning>) {
+    for (fit, name) in [(true, "rows that were fitted"), (false, "rows held out")] {
+        let own = || rows.iter().filter(|r| r.fit == fit && !r.outlier);
+        if own().count() < ENOUGH {
+            continue;
+        }
+        let [before, after] = [
+            crate::median::median(own().map(|r| r.before)),
+            crate::median::median(own().map(|r| r.after)),
+        ];
+        if after > before {
+            let message = format!(
+                "the calibrated robot is no better here than that of the file: {} mm in the middle of them, {} mm before. \
+                 Keep that of the file. Postures are too few or too alike, or rows are not what they are said to be",
+                number((1e6 * after).round() / 1e3),
+                number((1e6 * before).round() / 1e3)
+            );
+            warnings.push(Warning::new(WarningKind::NotExcited, name, message));
         }
     }
 }

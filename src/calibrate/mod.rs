@@ -10,6 +10,7 @@
 //! that are fitted; the rows held out judge the result and nothing else.
 
 mod actuators_at;
+mod apart;
 mod bench;
 mod bend;
 mod cells;
@@ -50,6 +51,8 @@ mod serial;
 mod start;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_bad;
 #[cfg(test)]
 mod tests_closed;
 mod unknown;
@@ -95,6 +98,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<(Calibration, Opened)> {
 pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Result<Calibrated> {
     let mut warnings = doubts::carried(input, opened);
     doubts::too_few(input)?;
+    let sound = apart::sound(input, opened, settings, &mut warnings)?;
+    let input = &sound;
     let bench = Bench::new(input, opened, settings, &mut warnings)?;
     let nominal = bench.model(Vec::new());
     let mut plan = bench.plan(&nominal);
@@ -122,6 +127,7 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     let rows = result::row_results(&model, &x, &groups, &strays, errors, covariance.as_ref());
     let groups = result::group_results(&groups, &rows);
     doubts::spoiled(&groups, &mut warnings);
+    doubts::worse(&rows, &mut warnings);
     let files = write::robot(opened, &x[..opened.kin.errors()])?;
     Ok(Calibrated {
         robot: opened.plant.name().to_string(),

@@ -42,6 +42,9 @@ const NEAR: f64 = 0.01;
 /// Weight of turns about an axis that is exact against that of positions, m²/rad²: 2 mm by which the robot is off at a
 /// position against 1 mrad of a camera.
 const EXACT: f64 = 4.0;
+/// Positions and orientations are those of a mirror image.
+const MIRRORED: &str =
+    "the target is mirrored, or the camera's axes are left-handed; turn one axis about";
 /// An explanation must lower the residual to this fraction.
 const EXPLAINED: f64 = 0.25;
 
@@ -205,7 +208,7 @@ fn explanations(pairs: &[Pair], degrees: Option<Vec<Frame>>) -> Vec<(&'static st
     for k in 0..3 {
         let s = flip(k);
         all.push((
-            "the target is mirrored, or the camera's axes are left-handed; turn one axis about",
+            MIRRORED,
             map(&|p| Pair {
                 seen: s * p.seen,
                 turned: p.turned.map(|r| s * r * s),
@@ -310,8 +313,15 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
                     && other.error / other.spread < EXPLAINED * found.error / found.spread
                     && other.error < SUSPICIOUS * other.spread
                 {
+                    // legs between two planes hold a platform on either side of the base
+                    let branch = match kin {
+                        Kin::Parallel(_) if why == MIRRORED => {
+                            "; or the platform stands in the mirrored assembly mode, on the other side of its base"
+                        }
+                        _ => "",
+                    };
                     return Err(about(format!(
-                        "no place of the {} explains what it saw (off by {} mm), but it looks as if {why} (then \
+                        "no place of the {} explains what it saw (off by {} mm), but it looks as if {why}{branch} (then \
                          {} mm)",
                         measured.instrument,
                         crate::error::number((1e3 * found.error).round()),

@@ -94,14 +94,20 @@ fn summary(found: &Calibrated, files: &[PathBuf]) -> String {
     );
     for (fit, name) in [(true, "fit"), (false, "holdout")] {
         let [before, after] = found.errors(fit, true).map(|e| Stats::of(&e));
+        let strays = found.rows.iter().any(|r| r.fit == fit && r.outlier);
+        let sound = Stats::of(&found.errors(fit, false)[1]).filter(|_| strays);
         if let (Some(a), Some(b)) = (before, after) {
             let _ = writeln!(
                 out,
-                "  {name}: mean error {:.3} mm before, {:.3} mm after (95 % {:.3}, maximum {:.3})",
+                "  {name}: mean error {:.3} mm before, {:.3} mm after (95 % {:.3}, maximum {:.3}){}",
                 1e3 * a.mean,
                 1e3 * b.mean,
                 1e3 * b.p95,
-                1e3 * b.max
+                1e3 * b.max,
+                sound.map_or(String::new(), |s| format!(
+                    ", {:.3} without outliers",
+                    1e3 * s.mean
+                ))
             );
         }
     }

@@ -27,7 +27,7 @@ use super::fit::Plan;
 use super::judge::{self, Errors, Stats};
 use super::model::{Model, Settings};
 use super::open::Opened;
-use super::{doubts, robust};
+use super::{apart, doubts, robust};
 use crate::error::{Result, Warning, WarningKind};
 use catalogue::Catalogue;
 use conditions::Conditions;
@@ -105,6 +105,8 @@ pub fn diagnose(input: &Calibration, opened: &Opened, ask: Ask) -> Result<PoseDi
     let mut warnings = doubts::carried(input, opened);
     doubts::too_few(input)?;
     let settings = Settings::default();
+    let sound = apart::sound(input, opened, settings, &mut warnings)?;
+    let input = &sound;
     let bench = Bench::new(input, opened, settings, &mut warnings)?;
     let nominal = bench.model(Vec::new());
     let plan = bench.plan(&nominal);
