@@ -1,6 +1,7 @@
 //! What the dependencies ask for: their licences and their Rust, of all platforms (`cargo metadata`).
 
 use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 /// Licences under which a program may be passed on with no more than their text (SPDX).
@@ -135,4 +136,43 @@ fn no_dependency_needs_a_newer_rust_than_stated() {
         .map(|p| format!("{}: {}", name(p), p["rust_version"]))
         .collect();
     assert!(newer.is_empty(), "{newer:#?}");
+}
+
+/// Features of every package that is built, by name and version.
+fn features(edges: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let cargo = std::env::var("CARGO").unwrap_or("cargo".into());
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    let out = Command::new(cargo)
+        .args(["tree", "--locked", "--prefix", "none", "--no-dedupe"])
+        .args([
+            "--format",
+            "{p}\t{f}",
+            "--edges",
+            edges,
+            "--manifest-path",
+            manifest,
+        ])
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{message}");
+    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for line in String::from_utf8_lossy(&out.stdout).lines() {
+        if let Some((package, features)) = line.split_once('\t') {
+            let of = all.entry(package.to_owned()).or_default();
+            of.insert(features.to_owned());
+        }
+    }
+    all
+}
+
+/// Otherwise `cargo run` after `cargo test` compiles the library once more, for minutes.
+#[test]
+#[ignore = "asks the registry for the packages of all platforms; .ci/run does"]
+fn tests_ask_for_no_other_features_than_the_program() {
+    let (program, tests) = (features("normal,build"), features("normal,build,dev"));
+    assert!(program.len() > 100, "{}", program.len());
+    for (package, of) in program {
+        assert_eq!(of, tests[&package], "{package}");
+    }
 }
