@@ -9,6 +9,7 @@ mod simulators;
 mod summary;
 
 use super::finding::Finding;
+use super::gap::JointGap;
 use super::result::Diagnosis;
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::Verdict;
@@ -88,12 +89,21 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                     f.title,
                     percent(f.confidence)
                 ),
+                None if !stands_out(d) => "Unknown: a refit explains the torques, with parameters farther from those of the robot file than \
+                     such a model may be, and no effect of the catalogue accounts for that."
+                    .into(),
                 None => {
                     "Unknown: there is a gap, and no effect of the catalogue explains it.".into()
                 }
             },
         ),
     }
+}
+
+/// Whether a refit of the nominal parameters leaves more on any joint than a sound model does.
+fn stands_out(d: &Diagnosis) -> bool {
+    let left = |g: &JointGap| (g.rms / g.noise).powi(2);
+    d.refit.iter().any(|g| left(g) > T.gap.sound)
 }
 
 fn claims(d: &Diagnosis) -> Vec<&Finding> {
@@ -109,13 +119,15 @@ pub fn html(d: &Diagnosis) -> String {
         crate::report::format::count(d.records.len(), "record"),
         d.records.iter().filter(|r| !r.fit).count()
     );
-    let sections = [
+    let mut sections = vec![
         Section::new("", summary::summary(d)),
         Section::new("Which effect", effects::effects(d)),
-        Section::new(
-            "What the second encoders show",
-            second_encoder::second_encoder(d),
-        ),
+    ];
+    if !d.second_encoder.is_empty() {
+        let shown = second_encoder::second_encoder(d);
+        sections.push(Section::new("What the second encoders show", shown));
+    }
+    sections.extend([
         Section::new("Where the gap lies", residuals::residuals(d)),
         Section::new(
             "Over velocity, position, torque and time",
@@ -128,7 +140,7 @@ pub fn html(d: &Diagnosis) -> String {
         Section::new("What to run next", next::next(d)),
         Section::new("What this data cannot say", summary::limits(d)),
         joints::order(d.joints.iter().map(String::as_str)),
-    ];
+    ]);
     page(
         &format!("{}: diagnosis", d.robot),
         &line,

@@ -64,13 +64,22 @@ fn held(f: &Finding) -> String {
     f.holdout.map_or("–".into(), percent)
 }
 
+/// A value whose interval is so many times as wide is not determined.
+const WIDE: f64 = 10.0;
+
 fn values(f: &Finding) -> Markup {
     html! {
         @for v in &f.values {
+            @let half = v.std.map_or(0.0, |s| 1.96 * s);
             div class="value" {
-                (v.name.replace('_', " ")) " " (significant(v.value, 4))
-                @if let Some(s) = v.std { @if s > 0.0 { " ± " (significant(1.96 * s, 2)) } }
-                " " (v.unit)
+                (v.name.replace('_', " ")) " "
+                @if half > WIDE * v.value.abs() {
+                    "not determined"
+                } @else {
+                    (significant(v.value, 4))
+                    @if half > 0.0 { " ± " (significant(half, 2)) }
+                    " " (v.unit)
+                }
             }
         }
     }

@@ -10,7 +10,10 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
         .max_by(|a, b| d.refit[*a].share.total_cmp(&d.refit[*b].share))
         .unwrap_or(0);
     let g = &d.refit[worst];
+    // what no effect was found for is gone by the refit alone
+    let found = d.findings.iter().any(|f| f.member);
     let shrink = d.holdout.map(|[a, b]| 1.0 - b / a.max(1e-9));
+    let shrink = shrink.filter(|_| found);
     let share = |s: Option<f64>| s.map_or("–".to_string(), percent);
     let all = [
         (
@@ -29,6 +32,7 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
             "of the gap gone on holdout records".into(),
             match shrink {
                 Some(_) => "with the effects found, parameters from the fitted records".into(),
+                None if d.holdout.is_some() => "no effect was found".into(),
                 None => {
                     "there is no holdout record in which anything moves: this cannot be said".into()
                 }
