@@ -268,7 +268,7 @@ class Diagnosis(_Model):
     """Why a model and its robot disagree."""
 
     _file = "diagnosis.json"
-    _may = ("robot.urdf", "robot.xml", "robot.toml", "effects.py", "next.json")
+    _may: Tuple[str, ...] = ("robot.urdf", "robot.xml", "robot.toml", "effects.py", "next.json")
     _rows = "findings"
 
     @classmethod
@@ -334,7 +334,7 @@ class Diagnosis(_Model):
 class PoseDiagnosis(Diagnosis):
     """Why the geometry of a robot and what was seen of its tool disagree; of a ``calibration.toml``."""
 
-    _may = ("next.csv",)
+    _may: Tuple[str, ...] = ("next.csv",)
 
     @property
     def holdout_shrink(self) -> float:
