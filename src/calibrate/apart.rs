@@ -4,7 +4,6 @@
 //! for the scale, tell every distance to a fraction of a millimetre, and a stated one can be held against that.
 
 use super::bench::Bench;
-use super::doubts;
 use super::file::{Calibration, Distance};
 use super::kind::Kind;
 use super::model::{Model, Settings};
@@ -13,6 +12,7 @@ use super::{fit, judge, robust};
 use crate::error::{Error, Result, Warning, WarningKind, number};
 use faer::Mat;
 use nalgebra::Vector3;
+use std::borrow::Cow;
 
 /// A stated distance is off where it differs from that of the rows by so many standard deviations,
 const FAR: f64 = 5.0;
@@ -115,17 +115,16 @@ fn exchanged(input: &Calibration, points: &Points) -> Vec<[usize; 2]> {
 ///
 /// # Errors
 /// More than half of the distances are so.
-pub(super) fn sound(
-    input: &Calibration,
+pub(super) fn sound<'a>(
+    input: &'a Calibration,
     opened: &Opened,
     settings: Settings,
     warnings: &mut Vec<Warning>,
-) -> Result<Calibration> {
-    let kept = input.clone();
-    if input.distances.is_empty() || doubts::too_few(input).is_err() {
-        return Ok(kept);
+) -> Result<Cow<'a, Calibration>> {
+    if input.distances.is_empty() {
+        return Ok(Cow::Borrowed(input));
     }
-    let mut free = kept.clone();
+    let mut free = input.clone();
     free.distances.clear();
     let bench = Bench::new(&free, opened, settings, &mut Vec::new())?;
     let mut model = bench.model(Vec::new());
@@ -134,14 +133,14 @@ pub(super) fn sound(
     plan.free = robust::seen(&model, &plan);
     let fit = robust::robustly(&mut model, &mut plan, &x)?;
     let Some(covariance) = fit::covariance(&model, &plan, &fit.x) else {
-        return Ok(kept);
+        return Ok(Cow::Borrowed(input));
     };
     let points = Points::new(&model, &fit.x, covariance);
     let off: Vec<usize> = (0..input.distances.len())
         .filter(|&k| points.contradicts(&input.distances[k]))
         .collect();
     let Some(&first) = off.first() else {
-        return Ok(kept);
+        return Ok(Cow::Borrowed(input));
     };
     let file = |m: usize| input.measurements[m].file.as_str();
     let pairs = exchanged(input, &points);
@@ -180,11 +179,7 @@ pub(super) fn sound(
         let message = format!("left out: {}", said(k));
         warnings.push(Warning::new(WarningKind::RecordLeftOut, named(k), message));
     }
-    let mut kept = kept;
-    let mut k = 0;
-    kept.distances.retain(|_| {
-        k += 1;
-        !off.contains(&(k - 1))
-    });
-    Ok(kept)
+    let sound = (0..input.distances.len()).filter(|k| !off.contains(k));
+    free.distances = sound.map(|k| input.distances[k].clone()).collect();
+    Ok(Cow::Owned(free))
 }

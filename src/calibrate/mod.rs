@@ -99,7 +99,7 @@ pub fn calibrate(input: &Calibration, opened: &Opened, settings: Settings) -> Re
     let mut warnings = doubts::carried(input, opened);
     doubts::too_few(input)?;
     let sound = apart::sound(input, opened, settings, &mut warnings)?;
-    let input = &sound;
+    let input = sound.as_ref();
     let bench = Bench::new(input, opened, settings, &mut warnings)?;
     let nominal = bench.model(Vec::new());
     let mut plan = bench.plan(&nominal);

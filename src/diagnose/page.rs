@@ -119,15 +119,13 @@ pub fn html(d: &Diagnosis) -> String {
         crate::report::format::count(d.records.len(), "record"),
         d.records.iter().filter(|r| !r.fit).count()
     );
-    let mut sections = vec![
+    let sections = [
         Section::new("", summary::summary(d)),
         Section::new("Which effect", effects::effects(d)),
-    ];
-    if !d.second_encoder.is_empty() {
-        let shown = second_encoder::second_encoder(d);
-        sections.push(Section::new("What the second encoders show", shown));
-    }
-    sections.extend([
+        Section::new(
+            "What the second encoders show",
+            second_encoder::second_encoder(d),
+        ),
         Section::new("Where the gap lies", residuals::residuals(d)),
         Section::new(
             "Over velocity, position, torque and time",
@@ -140,7 +138,7 @@ pub fn html(d: &Diagnosis) -> String {
         Section::new("What to run next", next::next(d)),
         Section::new("What this data cannot say", summary::limits(d)),
         joints::order(d.joints.iter().map(String::as_str)),
-    ]);
+    ];
     page(
         &format!("{}: diagnosis", d.robot),
         &line,

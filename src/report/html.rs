@@ -8,7 +8,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 pub struct Section {
     /// heading
     pub title: String,
-    /// contents
+    /// contents; a section without any is left out of the page
     pub body: Markup,
     /// what it brings: news that is not neutral has a mark of its own
     pub tone: Tone,
@@ -70,7 +70,7 @@ pub fn page(
                 header { h1 { (title) } p { (line) } }
                 main {
                     p class={ "verdict " (tone.class()) } { (verdict) }
-                    @for section in sections {
+                    @for section in sections.iter().filter(|s| !s.body.0.is_empty()) {
                         section class=(section.tone.class()) {
                             @if !section.title.is_empty() { h2 { (section.title) } }
                             (section.body)

@@ -88,17 +88,23 @@ fn licence_expressions_are_read() {
     }
 }
 
-fn packages() -> Vec<Value> {
+/// What cargo says of this project.
+fn cargo(args: &[&str]) -> String {
     let cargo = std::env::var("CARGO").unwrap_or("cargo".into());
     let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
     let out = Command::new(cargo)
-        .args(["metadata", "--format-version", "1", "--locked"])
-        .args(["--manifest-path", manifest])
+        .args(args)
+        .args(["--locked", "--manifest-path", manifest])
         .output()
         .unwrap();
     let message = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "{message}");
-    let all: Value = serde_json::from_slice(&out.stdout).unwrap();
+    String::from_utf8(out.stdout).unwrap()
+}
+
+fn packages() -> Vec<Value> {
+    let out = cargo(&["metadata", "--format-version", "1"]);
+    let all: Value = serde_json::from_str(&out).unwrap();
     all["packages"].as_array().unwrap().clone()
 }
 
@@ -140,24 +146,10 @@ fn no_dependency_needs_a_newer_rust_than_stated() {
 
 /// Features of every package that is built, by name and version.
 fn features(edges: &str) -> BTreeMap<String, BTreeSet<String>> {
-    let cargo = std::env::var("CARGO").unwrap_or("cargo".into());
-    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
-    let out = Command::new(cargo)
-        .args(["tree", "--locked", "--prefix", "none", "--no-dedupe"])
-        .args([
-            "--format",
-            "{p}\t{f}",
-            "--edges",
-            edges,
-            "--manifest-path",
-            manifest,
-        ])
-        .output()
-        .unwrap();
-    let message = String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{message}");
+    let format = ["--format", "{p}\t{f}", "--edges", edges];
+    let out = cargo(&[&["tree", "--prefix", "none", "--no-dedupe"], &format[..]].concat());
     let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for line in String::from_utf8_lossy(&out.stdout).lines() {
+    for line in out.lines() {
         if let Some((package, features)) = line.split_once('\t') {
             let of = all.entry(package.to_owned()).or_default();
             of.insert(features.to_owned());

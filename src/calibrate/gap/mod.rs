@@ -106,7 +106,7 @@ pub fn diagnose(input: &Calibration, opened: &Opened, ask: Ask) -> Result<PoseDi
     doubts::too_few(input)?;
     let settings = Settings::default();
     let sound = apart::sound(input, opened, settings, &mut warnings)?;
-    let input = &sound;
+    let input = sound.as_ref();
     let bench = Bench::new(input, opened, settings, &mut warnings)?;
     let nominal = bench.model(Vec::new());
     let plan = bench.plan(&nominal);
