@@ -22,7 +22,10 @@ COLUMNS = {
     "plane": [],
     "loop": [],
 }
-KEYS = {"kind", "q", "values", "use", "group", "std", "angle_std", "instrument", "cov"}
+#: Keys that stand in the file as they are: text, and lists of so many numbers.
+TEXTS = ("use", "group", "instrument", "hold")
+LISTS = {"base_at": 7, "base_at_std": 2, "target_at": 7, "target_at_std": 2, "grip": 7, "grip_std": 2}
+KEYS = {"kind", "q", "values", "std", "angle_std", "cov", *TEXTS, *LISTS}
 
 
 def write(
@@ -86,12 +89,18 @@ def _measurement(folder: Path, k: int, m: Mapping[str, Any]) -> List[str]:
         data += columns(cov.reshape(len(q), 36))
     Path(folder, _file(k)).write_text(_excite.table(names, data), encoding="utf-8")
     lines = ["[[measurement]]", f"kind = {json.dumps(kind)}", f"file = {json.dumps(_file(k))}"]
-    for key in ("use", "group", "instrument"):
+    for key in TEXTS:
         if m.get(key) is not None:
             lines.append(f"{key} = {json.dumps(str(m[key]))}")
     for key in ("std", "angle_std"):
         if m.get(key) is not None:
             lines.append(f"{key} = {float(m[key])!r}")
+    for key, count in LISTS.items():
+        if m.get(key) is not None:
+            values = finite(f"{where} {key}", numbers(f"{where} {key}", m[key]))
+            if values.shape != (count,):
+                raise unusable(f"{where} {key} must be {count} numbers; its shape is {values.shape}")
+            lines.append(f"{key} = {[float(v) for v in values]!r}")
     return lines
 
 

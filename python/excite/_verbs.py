@@ -348,7 +348,10 @@ def calibrate(
         measurements: one dictionary a placement: ``kind`` (``"pose"``, ``"position"``, ``"point"``, ``"plane"``,
             ``"gauge"``, ``"loop"``), ``q`` (readings, rad or m, ``(rows, joints)``), ``values`` (pose ``x y z qw qx qy qz``, position
             ``x y z``, m, or ``reading``, m; ``(rows, columns)``; none for points, planes and loops), and if wanted ``use``,
-            ``group``, ``std`` (m), ``angle_std`` (rad), ``instrument``, ``cov`` (``(rows, 6, 6)`` of poses).
+            ``group``, ``std`` (m), ``angle_std`` (rad), ``instrument``, ``cov`` (``(rows, 6, 6)`` of poses),
+            ``base_at`` and ``target_at`` (``x y z qw qx qy qz`` of the base in the instrument's frame and of the target in
+            the frame that is measured, where they are known) and their ``base_at_std`` and ``target_at_std`` (m, rad);
+            of loops ``hold``, ``grip``, ``grip_std``.
         distances: ``{"between": (0, 1), "value": m, "std": m}`` between the points of two measurements, by their place.
         frame: name of the frame that the measurement sees.
         other: of loops: name of the second arm's frame.

@@ -25,6 +25,10 @@ pub(super) struct Entry {
     hold: Option<Hold>,
     grip: Option<[f64; 7]>,
     grip_std: Option<[f64; 2]>,
+    base_at: Option<[f64; 7]>,
+    base_at_std: Option<[f64; 2]>,
+    target_at: Option<[f64; 7]>,
+    target_at_std: Option<[f64; 2]>,
 }
 
 /// How two arms hold each other.
@@ -57,6 +61,10 @@ impl Entry {
             hold: None,
             grip: None,
             grip_std: None,
+            base_at: None,
+            base_at_std: None,
+            target_at: None,
+            target_at_std: None,
         }
     }
 
@@ -124,24 +132,84 @@ impl Entry {
         if kind == Kind::Ball {
             return wrong("grip is that of a rigid hold; where a ball joint sits is found".into());
         }
-        let [x, y, z, qw, qx, qy, qz] = g;
-        let quaternion = Quaternion::new(qw, qx, qy, qz);
-        if !g.iter().all(|v| v.is_finite()) || (quaternion.norm() - 1.0).abs() > 1e-3 {
-            return wrong(
-            "grip is x, y, z (m) and qw, qx, qy, qz (of length 1) of the second frame in the first"
-                .into(),
-        );
-        }
         let std = self.grip_std.unwrap_or(GRIP_STD);
-        if !std.iter().all(|v| v.is_finite() && *v > 0.0) {
-            return wrong("grip_std is two positive numbers, m and rad".into());
-        }
-        let frame = Frame {
-            r: *UnitQuaternion::from_quaternion(quaternion)
-                .to_rotation_matrix()
-                .matrix(),
-            p: Vector3::new(x, y, z),
-        };
-        Ok(Some((frame, std)))
+        Ok(Some((
+            frame("grip", g, "the second frame in the first")?,
+            deviations("grip_std", std)?,
+        )))
     }
+
+    /// Where the base is known to stand before the instrument, and the target on the frame.
+    pub(super) fn known(&self) -> Result<[Option<KnownPlace>; 2]> {
+        let place = |key: &str, at: Option<[f64; 7]>, std: Option<[f64; 2]>, of: &str| {
+            let std_key = format!("{key}_std");
+            let Some(at) = at else {
+                return match std {
+                    None => Ok(None),
+                    Some(_) => Err(Error::Argument(format!(
+                        "{std_key} is that of {key}, and there is none"
+                    ))),
+                };
+            };
+            if !self.kind().has_instrument() {
+                return Err(Error::Argument(format!(
+                    "{key} is for measurements by a camera or a tracker: kind = \"pose\", \"pixels\" or \"position\""
+                )));
+            }
+            Ok(Some(KnownPlace {
+                frame: frame(key, at, of)?,
+                std: std.map(|s| deviations(&std_key, s)).transpose()?,
+            }))
+        };
+        Ok([
+            place(
+                "base_at",
+                self.base_at,
+                self.base_at_std,
+                "the robot's base in the frame of the instrument",
+            )?,
+            place(
+                "target_at",
+                self.target_at,
+                self.target_at_std,
+                "the target in the frame that is measured",
+            )?,
+        ])
+    }
+}
+
+/// A place of the set-up that the file states.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownPlace {
+    /// where it is
+    pub frame: Frame,
+    /// its standard deviations, m and rad; it is taken as exact without them
+    pub std: Option<[f64; 2]>,
+}
+
+/// A pose as `x, y, z, qw, qx, qy, qz`.
+fn frame(key: &str, at: [f64; 7], of: &str) -> Result<Frame> {
+    let [x, y, z, qw, qx, qy, qz] = at;
+    let quaternion = Quaternion::new(qw, qx, qy, qz);
+    if !at.iter().all(|v| v.is_finite()) || (quaternion.norm() - 1.0).abs() > 1e-3 {
+        return Err(Error::Argument(format!(
+            "{key} is x, y, z (m) and qw, qx, qy, qz (of length 1) of {of}"
+        )));
+    }
+    Ok(Frame {
+        r: *UnitQuaternion::from_quaternion(quaternion)
+            .to_rotation_matrix()
+            .matrix(),
+        p: Vector3::new(x, y, z),
+    })
+}
+
+/// Standard deviations of a pose.
+fn deviations(key: &str, std: [f64; 2]) -> Result<[f64; 2]> {
+    if std.iter().all(|v| v.is_finite() && *v > 0.0) {
+        return Ok(std);
+    }
+    Err(Error::Argument(format!(
+        "{key} is two positive numbers, m and rad"
+    )))
 }

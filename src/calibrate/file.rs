@@ -1,6 +1,6 @@
 //! `calibration.toml`.
 
-use super::entry::Entry;
+use super::entry::{Entry, KnownPlace};
 use super::frame::Frame;
 use super::kind::Kind;
 use super::row::{Row, Source};
@@ -25,6 +25,10 @@ pub struct Measurement {
     pub instrument: String,
     /// the second arm's frame in that of the first where it is known, and its standard deviations (m, rad); of a loop
     pub grip: Option<(Frame, [f64; 2])>,
+    /// where the base is known to stand before the instrument
+    pub base_at: Option<KnownPlace>,
+    /// where the target is known to sit on the frame
+    pub target_at: Option<KnownPlace>,
 }
 
 /// A known distance between the points of two files.
@@ -249,15 +253,14 @@ impl Calibration {
                      for the second above",
                 ));
             }
-            let grip = entry.grip().map_err(|e| match e {
+            let here = |e: Error| match e {
                 Error::Argument(what) => Error::file(path, place(at), what),
                 other => other,
-            })?;
+            };
+            let grip = entry.grip().map_err(here)?;
+            let [base_at, target_at] = entry.known().map_err(here)?;
             let [usual, usual_angle] = kind.noise();
-            let optics = entry.optics(folder).map_err(|e| match e {
-                Error::Argument(what) => Error::file(path, place(at), what),
-                other => other,
-            })?;
+            let optics = entry.optics(folder).map_err(here)?;
             // of pictures the noise is one of pixels, and that of the poses follows from it
             let (std, angle) = match optics {
                 Some(_) => (None, None),
@@ -291,6 +294,8 @@ impl Calibration {
                 std: [std.unwrap_or(usual), angle.unwrap_or(usual_angle)],
                 instrument: entry.instrument.unwrap_or_else(|| instrument.into()),
                 grip,
+                base_at,
+                target_at,
             });
         }
         if let Some(o) = &file.other

@@ -1,10 +1,16 @@
 //! The unknowns of the set-up: which there are, and where they start.
 
+use super::entry::KnownPlace;
 use super::file::Calibration;
 use super::frame::Frame;
 use super::kind::Kind;
 use super::unknown::{Part, Unknown};
 use nalgebra::Vector3;
+
+/// Standard deviation of a place that is stated as exact, m and rad.
+const EXACT: f64 = 1e-9;
+/// Size by which columns of a stated place are scaled, m and rad.
+const KNOWN_SCALE: f64 = 0.01;
 
 /// Where the unknowns of the set-up begin, by measurement.
 #[derive(Debug, Clone, Default)]
@@ -58,6 +64,23 @@ impl Layout {
     pub fn new(input: &Calibration, unknowns: &mut Vec<Unknown>) -> Self {
         let mut layout = Layout::default();
         let wide = [input.prior.pose_length, input.prior.pose_angle];
+        let place = |name: &str, part: Part, known: Option<KnownPlace>| -> Vec<Unknown> {
+            let std = match known {
+                None => wide,
+                Some(known) => known.std.unwrap_or([EXACT; 2]),
+            };
+            let held = known.is_some_and(|k| k.std.is_none());
+            let all = Unknown::frame(name, part, std).into_iter();
+            all.map(|u| match known {
+                None => u,
+                Some(_) => Unknown {
+                    scale: KNOWN_SCALE,
+                    held,
+                    ..u
+                },
+            })
+            .collect()
+        };
         for (m, measured) in input.measurements.iter().enumerate() {
             let earlier = input.measurements[..m]
                 .iter()
@@ -73,15 +96,15 @@ impl Layout {
                 }
                 (Kind::Pose, None) => {
                     camera = Some(unknowns.len());
-                    unknowns.extend(Unknown::frame(&name("camera"), Part::Camera, wide));
+                    unknowns.extend(place(&name("camera"), Part::Camera, measured.base_at));
                     target = Some(unknowns.len());
-                    unknowns.extend(Unknown::frame(&name("target"), Part::Target, wide));
+                    unknowns.extend(place(&name("target"), Part::Target, measured.target_at));
                 }
                 (Kind::Position, None) => {
                     camera = Some(unknowns.len());
-                    unknowns.extend(Unknown::frame(&name("tracker"), Part::Camera, wide));
+                    unknowns.extend(place(&name("tracker"), Part::Camera, measured.base_at));
                     target = Some(unknowns.len());
-                    let frame = Unknown::frame(&name("target"), Part::Target, wide);
+                    let frame = place(&name("target"), Part::Target, measured.target_at);
                     unknowns.extend(frame.into_iter().take(3));
                 }
                 (Kind::Point, _) => {

@@ -55,6 +55,8 @@ mod tests;
 mod tests_bad;
 #[cfg(test)]
 mod tests_closed;
+#[cfg(test)]
+mod tests_known;
 mod unknown;
 #[doc(hidden)]
 pub mod write;

@@ -17,7 +17,9 @@ pub(super) fn seen(model: &Model, plan: &Plan) -> Vec<bool> {
     let mut free: Vec<bool> = (0..model.count()).map(|k| k < model.of_robot).collect();
     for (i, row) in model.input.rows.iter().enumerate() {
         if plan.weights[i] > 0.0 {
-            own(model, row.measurement, |k| free[k] = true);
+            own(model, row.measurement, |k| {
+                free[k] = !model.unknowns[k].held
+            });
         }
     }
     free
@@ -55,7 +57,10 @@ pub(super) fn set_up(model: &Model, plan: &Plan, x: &[f64]) -> Result<Vec<f64>> 
     // without it nothing holds the tilt of a camera before a robot that keeps its own
     let mut model = model.clone();
     model.settings.orientation = true;
-    let x = fit::solve(&model, &only, x)?.x;
+    let x = match only.free.contains(&true) {
+        true => fit::solve(&model, &only, x)?.x,
+        false => x.to_vec(),
+    };
     set_up_rest(&model, plan, &x)
 }
 
@@ -70,7 +75,7 @@ pub(super) fn set_up_rest(model: &Model, plan: &Plan, x: &[f64]) -> Result<Vec<f
     for (i, row) in model.input.rows.iter().enumerate() {
         let mut new = false;
         own(model, row.measurement, |k| {
-            if !known[k] {
+            if !known[k] && !model.unknowns[k].held {
                 rest.free[k] = true;
                 new = true;
             }

@@ -154,6 +154,36 @@ fn once(pairs: &[Pair], all: &[Pair], exact: bool) -> Option<Aligned> {
     Some(found)
 }
 
+/// Camera and target where one or both of them are stated; the other one as the rows have it then.
+fn stated(found: &Aligned, pairs: &[Pair], at: [Option<Frame>; 2]) -> Aligned {
+    let mut placed = *found;
+    if let [None, None] = at {
+        return placed;
+    }
+    placed.camera = at[0].unwrap_or(placed.camera);
+    placed.target = at[1].unwrap_or(placed.target);
+    let n = pairs.len().max(1) as f64;
+    if at[1].is_none() {
+        let back = placed.camera.r.transpose();
+        let turns = (pairs.iter()).filter_map(|p| Some(p.base.r.transpose() * back * p.turned?));
+        placed.target.r = nearest_rotation(&turns.sum()).map_or(placed.target.r, |r| r.0);
+        let shift =
+            |p: &Pair| p.base.r.transpose() * (back * (p.seen - placed.camera.p) - p.base.p);
+        placed.target.p = pairs.iter().map(shift).sum::<Vector3<f64>>() / n;
+    }
+    if at[0].is_none() {
+        let turns = (pairs.iter())
+            .filter_map(|p| Some(p.turned? * (p.base.r * placed.target.r).transpose()));
+        placed.camera.r = nearest_rotation(&turns.sum()).map_or(placed.camera.r, |r| r.0);
+        let shift = |p: &Pair| p.seen - placed.camera.r * p.base.then(&placed.target).p;
+        placed.camera.p = pairs.iter().map(shift).sum::<Vector3<f64>>() / n;
+    }
+    let mut errors: Vec<f64> = pairs.iter().map(|p| distance(&placed, p)).collect();
+    errors.sort_by(f64::total_cmp);
+    placed.error = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+    placed
+}
+
 /// What a mistaken file may mean, in words, and how it would be read then.
 fn explanations(pairs: &[Pair], degrees: Option<Vec<Frame>>) -> Vec<(&'static str, Vec<Pair>)> {
     let map = |f: &dyn Fn(&Pair) -> Pair| pairs.iter().map(f).collect::<Vec<_>>();
@@ -329,8 +359,25 @@ pub fn start(input: &Calibration, kin: &Kin, poses: &[Option<Frame>]) -> Result<
                     )));
                 }
             }
-            start.camera[m] = found.camera;
-            start.target[m] = found.target;
+            let at = [measured.base_at, measured.target_at].map(|k| k.map(|k| k.frame));
+            let placed = stated(&found, &pairs, at);
+            if placed.error > (SUSPICIOUS * found.spread).max(found.error) {
+                return Err(about(format!(
+                    "{} do not fit what was seen: with them the target is off by {} mm in the middle of the rows, and by {} mm \
+                     with places found from the rows. base_at is the base in the frame of the {}, target_at the target in \
+                     the frame that is measured",
+                    match at {
+                        [Some(_), Some(_)] => "base_at and target_at",
+                        [Some(_), None] => "the numbers of base_at",
+                        _ => "the numbers of target_at",
+                    },
+                    crate::error::number((1e3 * placed.error).round()),
+                    crate::error::number((1e4 * found.error).round() / 10.0),
+                    measured.instrument,
+                )));
+            }
+            start.camera[m] = placed.camera;
+            start.target[m] = placed.target;
             continue;
         }
         if measured.kind.is_loop() {

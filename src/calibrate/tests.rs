@@ -52,6 +52,8 @@ pub(super) fn measurement(kind: Kind, file: &str, group: &str, std: [f64; 2]) ->
         std,
         instrument: format!("{} instrument", kind.name()),
         grip: None,
+        base_at: None,
+        target_at: None,
     }
 }
 
@@ -314,8 +316,21 @@ fn counts_are_those_of_the_literature() {
     );
 }
 
+/// Where the base stands before the camera of [`made`], and the target on the frame.
+pub(super) fn places() -> [Frame; 2] {
+    let camera = Frame {
+        r: exp(&Vector3::new(2.8, 0.3, -0.4)),
+        p: Vector3::new(0.3, -0.4, 1.8),
+    };
+    let target = Frame {
+        r: exp(&Vector3::new(0.1, 0.4, -0.3)),
+        p: Vector3::new(0.02, 0.03, 0.06),
+    };
+    [camera, target]
+}
+
 /// A robot with known errors, seen by a camera or tracker with noise; rows held out are seen without.
-fn made(
+pub(super) fn made(
     opened: &Opened,
     kind: Kind,
     std: [f64; 2],
@@ -327,14 +342,7 @@ fn made(
     let r = &mut ChaCha8Rng::seed_from_u64(seed);
     let unknowns = opened.kin.unknowns(tolerance);
     let x: Vec<f64> = unknowns.iter().map(|u| u.prior * normal(r)).collect();
-    let camera = Frame {
-        r: exp(&Vector3::new(2.8, 0.3, -0.4)),
-        p: Vector3::new(0.3, -0.4, 1.8),
-    };
-    let target = Frame {
-        r: exp(&Vector3::new(0.1, 0.4, -0.3)),
-        p: Vector3::new(0.02, 0.03, 0.06),
-    };
+    let [camera, target] = places();
     let list = postures(opened, r, rows[0] + rows[1]);
     let list = list.into_iter().enumerate().map(|(i, q)| {
         let posed = opened.kin.pose(&q, &x, &[], &[], None).unwrap();
@@ -359,7 +367,7 @@ fn made(
     )
 }
 
-fn after(opened: &Opened, c: &Calibration, settings: Settings) -> (Stats, Calibrated) {
+pub(super) fn after(opened: &Opened, c: &Calibration, settings: Settings) -> (Stats, Calibrated) {
     let found = calibrate(c, opened, settings).unwrap();
     let [_, after] = found.errors(false, true);
     (Stats::of(&after).unwrap(), found)

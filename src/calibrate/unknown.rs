@@ -42,6 +42,8 @@ pub struct Unknown {
     pub prior: f64,
     /// size by which columns of the Jacobian are scaled, in its unit
     pub scale: f64,
+    /// stated, not to be found
+    pub held: bool,
 }
 
 impl Unknown {
@@ -53,6 +55,7 @@ impl Unknown {
             part,
             prior,
             scale: prior,
+            held: false,
         }
     }
 

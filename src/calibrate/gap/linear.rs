@@ -144,7 +144,9 @@ impl<'a> Bed<'a> {
 
     /// The problem in the columns of effects.
     pub fn problem(&self) -> Result<Problem> {
-        let set_up: Vec<usize> = (self.model.of_robot..self.model.count()).collect();
+        let set_up: Vec<usize> = (self.model.of_robot..self.model.count())
+            .filter(|&k| !self.model.unknowns[k].held)
+            .collect();
         let precision = |k: &usize| {
             let u = &self.model.unknowns[*k];
             (u.scale / u.prior).powi(2).max(1e-9)

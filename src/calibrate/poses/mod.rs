@@ -221,6 +221,8 @@ pub(super) fn calibration(opened: &Opened, request: &Request, found: &[Candidate
             std: request.std,
             instrument: "camera".into(),
             grip: None,
+            base_at: None,
+            target_at: None,
         })
         .collect();
     let row = |c: &Candidate| Row {
