@@ -98,7 +98,7 @@ impl Model<'_> {
         }
         j.view_mut((0, n), (lines, 12))
             .copy_from(&(&by_pose * &moves));
-        let spread = match data.covariance {
+        let spread = match self.spread(data) {
             Some(c) => c,
             None => {
                 let [s, a] = self.input.measurements[m].std;

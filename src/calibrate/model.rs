@@ -96,6 +96,8 @@ pub struct Model<'a> {
     pub settings: Settings,
     /// whether poses are taken to be measured where the unknowns put them: what can be told does not hang on noise
     pub consistent: bool,
+    /// whether a row's own covariance counts by its size alone, the same in all directions
+    pub even: bool,
 }
 
 impl<'a> Model<'a> {
@@ -130,6 +132,7 @@ impl<'a> Model<'a> {
             nominal,
             settings,
             consistent: false,
+            even: false,
         }
     }
 
@@ -365,6 +368,17 @@ impl<'a> Model<'a> {
         }
     }
 
+    /// Covariance of a pose where its row states one.
+    pub fn spread(&self, row: &Row) -> Option<Matrix6<f64>> {
+        let own = row.covariance?;
+        if !self.even {
+            return Some(own);
+        }
+        let mean = |from: usize| (from..from + 3).map(|k| own[(k, k)]).sum::<f64>() / 3.0;
+        let [p, r] = [mean(0), mean(3)];
+        Some(Matrix6::from_diagonal(&[p, p, p, r, r, r].into()))
+    }
+
     /// `W` with `Wᵀ W` the inverse covariance of a pose.
     pub fn whitener(&self, row: &Row) -> DMatrix<f64> {
         let [s, a] = self.input.measurements[row.measurement].std;
@@ -372,7 +386,7 @@ impl<'a> Model<'a> {
             let d = [s, s, s, a, a, a].map(|v| 1.0 / v);
             Matrix6::from_diagonal(&d.into())
         };
-        let w = match row.covariance {
+        let w = match self.spread(row) {
             Some(c) => match c.cholesky().and_then(|l| l.l().try_inverse()) {
                 Some(inverse) => inverse,
                 None => plain(),

@@ -46,7 +46,9 @@ fn own(model: &Model, m: usize, mut each: impl FnMut(usize)) {
         .for_each(&mut each);
 }
 
-/// The set-up alone, for the robot as it is: fitted rows first, then what only held-out rows see.
+/// The set-up alone, for the robot as it is: fitted rows first, then what only held-out rows see. What is left are errors
+/// of the robot, not of the camera. Where a picture is sharp in one direction and dull in another, they would drive the
+/// set-up along the dull one: the covariance of a pose counts by its size.
 pub(super) fn set_up(model: &Model, plan: &Plan, x: &[f64]) -> Result<Vec<f64>> {
     let mut free = seen(model, plan);
     free[..model.of_robot].fill(false);
@@ -57,6 +59,7 @@ pub(super) fn set_up(model: &Model, plan: &Plan, x: &[f64]) -> Result<Vec<f64>> 
     // without it nothing holds the tilt of a camera before a robot that keeps its own
     let mut model = model.clone();
     model.settings.orientation = true;
+    model.even = true;
     let x = match only.free.contains(&true) {
         true => fit::solve(&model, &only, x)?.x,
         false => x.to_vec(),

@@ -205,6 +205,7 @@ impl<'a> Problem<'a> {
             noise: model.noise,
             settings: model.settings,
             consistent: true,
+            even: false,
         };
         jacobian(&model, 0)
     }
