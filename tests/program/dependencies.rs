@@ -144,10 +144,11 @@ fn no_dependency_needs_a_newer_rust_than_stated() {
     assert!(newer.is_empty(), "{newer:#?}");
 }
 
-/// Features of every package that is built, by name and version.
-fn features(edges: &str) -> BTreeMap<String, BTreeSet<String>> {
+/// Features of every package that is built for a member, by name and version.
+fn features(member: &str, edges: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let of = ["tree", "--prefix", "none", "--no-dedupe", "--package", member];
     let format = ["--format", "{p}\t{f}", "--edges", edges];
-    let out = cargo(&[&["tree", "--prefix", "none", "--no-dedupe"], &format[..]].concat());
+    let out = cargo(&[&of[..], &format[..]].concat());
     let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for line in out.lines() {
         if let Some((package, features)) = line.split_once('\t') {
@@ -158,13 +159,17 @@ fn features(edges: &str) -> BTreeMap<String, BTreeSet<String>> {
     all
 }
 
-/// Otherwise `cargo run` after `cargo test` compiles the library once more, for minutes.
+/// Otherwise `cargo run` after `cargo test`, or the Python package after either, compiles the library once more, for
+/// minutes.
 #[test]
 #[ignore = "asks the registry for the packages of all platforms; .ci/run does"]
-fn tests_ask_for_no_other_features_than_the_program() {
-    let (program, tests) = (features("normal,build"), features("normal,build,dev"));
+fn tests_and_python_ask_for_no_other_features_than_the_program() {
+    let program = features("excite", "normal,build");
     assert!(program.len() > 100, "{}", program.len());
-    for (package, of) in program {
-        assert_eq!(of, tests[&package], "{package}");
+    for (member, edges) in [("excite", "normal,build,dev"), ("excite-python", "normal,build")] {
+        let other = features(member, edges);
+        for (package, of) in &program {
+            assert_eq!(of, &other[package], "{member}: {package}");
+        }
     }
 }
