@@ -146,7 +146,14 @@ fn no_dependency_needs_a_newer_rust_than_stated() {
 
 /// Features of every package that is built for a member, by name and version.
 fn features(member: &str, edges: &str) -> BTreeMap<String, BTreeSet<String>> {
-    let of = ["tree", "--prefix", "none", "--no-dedupe", "--package", member];
+    let of = [
+        "tree",
+        "--prefix",
+        "none",
+        "--no-dedupe",
+        "--package",
+        member,
+    ];
     let format = ["--format", "{p}\t{f}", "--edges", edges];
     let out = cargo(&[&of[..], &format[..]].concat());
     let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -166,7 +173,10 @@ fn features(member: &str, edges: &str) -> BTreeMap<String, BTreeSet<String>> {
 fn tests_and_python_ask_for_no_other_features_than_the_program() {
     let program = features("excite", "normal,build");
     assert!(program.len() > 100, "{}", program.len());
-    for (member, edges) in [("excite", "normal,build,dev"), ("excite-python", "normal,build")] {
+    for (member, edges) in [
+        ("excite", "normal,build,dev"),
+        ("excite-python", "normal,build"),
+    ] {
         let other = features(member, edges);
         for (package, of) in &program {
             assert_eq!(of, &other[package], "{member}: {package}");

@@ -13,6 +13,7 @@ pub mod plan;
 pub mod plant;
 pub mod random;
 pub mod refit;
+pub mod reliability;
 pub mod robots;
 pub mod score;
 pub mod simulate;

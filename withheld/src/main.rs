@@ -34,6 +34,15 @@ enum Command {
         #[command(flatten)]
         run: run::Options,
     },
+    /// How often names are right that were given with some confidence, over sets that were diagnosed before
+    Reliability {
+        /// Folders of the sets
+        #[arg(required = true)]
+        sets: Vec<PathBuf>,
+        /// Picture to write
+        #[arg(long, default_value = "target/reliability.svg")]
+        picture: PathBuf,
+    },
 }
 
 #[derive(Args)]
@@ -135,6 +144,7 @@ fn main() -> std::process::ExitCode {
         Command::Generate(set) => generate(set),
         Command::Check { set, run } => generate(set).and_then(|()| run::score(&set.output, run)),
         Command::Score { set, run } => run::score(set, run),
+        Command::Reliability { sets, picture } => run::reliability(sets, picture),
     };
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
 use withheld::score::{self, Judged};
-use withheld::table;
+use withheld::{reliability, table};
 
 #[derive(clap::Args)]
 pub struct Options {
@@ -37,18 +37,66 @@ fn read(path: &Path) -> Result<Value, String> {
     serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
+/// Cases that were judged, and those whose diagnosis failed with the reason.
+type Scored = (Vec<Judged>, Vec<(String, String)>);
+
 /// Diagnoses every case of `set`, then scores; tables go to standard output and to files.
 pub fn score(set: &Path, options: &Options) -> Result<(), String> {
     let results = options
         .results
         .clone()
         .unwrap_or_else(|| set.join("results"));
+    let (folders, seconds) = diagnoses(set, &results, options)?;
+    let (judged, failed) = judge(set, &results, &folders, &seconds)?;
+    let text = table::markdown(&judged, &failed);
+    let write = |name: &str, text: &str| {
+        let path = results.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
+    };
+    write("cases.csv", &table::csv(&judged))?;
+    write("confusion.csv", &table::confusion(&judged))?;
+    write("results.md", &text)?;
+    print!("{text}");
+    Ok(())
+}
+
+/// How often names are right that are given with some confidence, over sets that were diagnosed.
+pub fn reliability(sets: &[PathBuf], picture: &Path) -> Result<(), String> {
+    let mut all = Vec::new();
+    for set in sets {
+        let results = set.join("results");
+        let mut folders = folders(set)?;
+        folders.retain(|f| {
+            let case = f.file_name().unwrap_or_default();
+            results.join(case).join("diagnosis.json").exists()
+        });
+        let seconds = vec![0.0; folders.len()];
+        let (judged, _) = judge(set, &results, &folders, &seconds)?;
+        eprintln!("{}: {} cases", set.display(), judged.len());
+        all.extend(judged);
+    }
+    print!("{}", reliability::table(&all));
+    reliability::picture(&all, picture)
+}
+
+/// The cases of a set.
+fn folders(set: &Path) -> Result<Vec<PathBuf>, String> {
     let mut folders: Vec<PathBuf> = std::fs::read_dir(set)
         .map_err(|e| format!("{}: {e}", set.display()))?
         .filter_map(|e| e.ok().map(|e| e.path()))
         .filter(|p| p.join("experiment.toml").exists())
         .collect();
     folders.sort();
+    Ok(folders)
+}
+
+/// Diagnoses the cases of a set; the folders of the cases and how long each took, s.
+fn diagnoses(
+    set: &Path,
+    results: &Path,
+    options: &Options,
+) -> Result<(Vec<PathBuf>, Vec<f64>), String> {
+    let folders = folders(set)?;
     let mut seconds = Vec::new();
     for folder in &folders {
         let name = folder.file_name().unwrap_or_default();
@@ -65,14 +113,23 @@ pub fn score(set: &Path, options: &Options) -> Result<(), String> {
         }
         seconds.push(clock.elapsed().as_secs_f64());
     }
-    // only now
+    Ok((folders, seconds))
+}
+
+/// Opens the answers, which nothing has read before.
+fn judge(
+    set: &Path,
+    results: &Path,
+    folders: &[PathBuf],
+    seconds: &[f64],
+) -> Result<Scored, String> {
     let truth = read(&set.join("truth.json"))?;
     let answers = truth["cases"]
         .as_array()
         .ok_or("truth.json has no `cases`")?;
     let mut judged: Vec<Judged> = Vec::new();
     let mut failed = Vec::new();
-    for (folder, seconds) in folders.iter().zip(seconds) {
+    for (folder, &seconds) in folders.iter().zip(seconds) {
         let name = folder
             .file_name()
             .unwrap_or_default()
@@ -97,16 +154,7 @@ pub fn score(set: &Path, options: &Options) -> Result<(), String> {
             }
         }
     }
-    let text = table::markdown(&judged, &failed);
-    let write = |name: &str, text: &str| {
-        let path = results.join(name);
-        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
-    };
-    write("cases.csv", &table::csv(&judged))?;
-    write("confusion.csv", &table::confusion(&judged))?;
-    write("results.md", &text)?;
-    print!("{text}");
-    Ok(())
+    Ok((judged, failed))
 }
 
 /// A failure leaves no `diagnosis.json` and is counted by the scorer.

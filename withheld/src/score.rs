@@ -48,6 +48,8 @@ pub struct Judged {
     /// Claims that are neither right nor tolerated.
     pub wrong: Vec<String>,
     pub outcomes: Vec<Outcome>,
+    /// Confidence of every finding and whether its name is right, names of ordinary parameter errors left out.
+    pub names: Vec<(f64, bool)>,
     pub seconds: f64,
 }
 
@@ -155,6 +157,9 @@ pub fn judge(truth: &Value, diagnosis: &Value, seconds: f64) -> Result<Judged, S
             .map(|f| f.effect.clone())
             .collect(),
         outcomes,
+        names: (ranked.iter())
+            .map(|f| (f.confidence, is_right(&f.effect)))
+            .collect(),
         seconds,
     })
 }

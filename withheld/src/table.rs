@@ -195,6 +195,7 @@ pub fn markdown(judged: &[Judged], failed: &[(String, String)]) -> String {
     line("longest diagnosis", format!("{slowest:.0} s"), "30 s");
     limits(&mut s, judged);
     answers(&mut s, judged);
+    s.push_str(&crate::reliability::table(judged));
     for (case, why) in failed {
         let _ = writeln!(s, "\n{case} failed: {why}");
     }
