@@ -76,7 +76,8 @@ def design(
             where left out. Sets criterion, unknowns, harmonics, period and periods.
         payload: the load that ``purpose="load"`` is about: kg, centre of mass (m) and tensor about it (kg m²), 4 or 10
             numbers; an ordinary one where left out.
-        harmonics: of the Fourier series of each joint; 5, or what serves the purpose.
+        harmonics: of the Fourier series of each joint; 8 for the criterion ``"known"``, 5 for others and with ``diagnostic``, or
+            what serves the purpose.
         period: s; 10, or what serves the purpose.
         periods: of the experiment; 1, 3 with ``diagnostic``, or what gives a minute for the purpose.
         grid: harmonics used: ``"full"``, ``"odd"``, ``"random-odd"``.
@@ -89,7 +90,7 @@ def design(
         derate: fraction of every limit that may be used.
         rate: of ``samples.csv``, Hz.
         seed: of the random starts.
-        starts: most starts; 12 where neither this nor a time limit is given.
+        starts: most starts; 12, from 8 harmonics on 8, where neither this nor a time limit is given.
         time_limit: wall clock of the optimisation, s.
         threads: 0 for one a core.
         identify: joint columns, for all joints: of armature, viscous, coulomb, offset; ``()`` for none; as in the robot

@@ -5,7 +5,7 @@ use crate::error::{argument, to_python};
 use crate::named::named;
 use crate::plant::Plant;
 use crate::report::Report;
-use excite::cli::design::{check_rate, diagnostic, periods, usual};
+use excite::cli::design::{check_rate, diagnostic, harmonics as usual_harmonics, periods, usual};
 use excite::cli::pretty;
 use excite::design::{Condition, Control, Progress, Question, design_with};
 use excite::identifiability::{assess as assessed, json::json, page};
@@ -59,7 +59,6 @@ pub fn design(
     let question: Option<Question> = purpose.map(|p| named("purpose", &p)).transpose()?;
     // of a question period, harmonics, criterion and condition are its own
     let mut settings = usual(question, payload.as_deref()).map_err(|e| to_python(&e))?;
-    settings.harmonics = harmonics.unwrap_or(settings.harmonics);
     settings.period = period.unwrap_or(settings.period);
     if question.is_none() || periods_.is_some() {
         settings.periods = periods(periods_, diagnostic).map_err(|e| to_python(&e))?;
@@ -73,7 +72,9 @@ pub fn design(
     if question.is_none() {
         settings.criterion = named("criterion", &criterion)?;
         settings.condition = condition.unwrap_or(Condition::usual(&core));
+        settings.harmonics = usual_harmonics(settings.criterion, diagnostic);
     }
+    settings.harmonics = harmonics.unwrap_or(settings.harmonics);
     settings.question = question;
     settings.derate = derate;
     settings.seed = seed;

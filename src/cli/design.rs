@@ -52,7 +52,8 @@ pub struct Args {
         allow_hyphen_values = true
     )]
     payload: Option<String>,
-    /// Harmonics of the Fourier series of each joint [default: 5; with --for what serves it]
+    /// Harmonics of the Fourier series of each joint [default: 8 for --criterion known, otherwise and
+    /// with --diagnostic 5; with --for what serves it]
     #[arg(long, allow_negative_numbers = true)]
     harmonics: Option<usize>,
     /// Period in seconds [default: 10; with --for what serves it]
@@ -103,7 +104,8 @@ pub struct Args {
     /// Seed of the random starts
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
-    /// Most starts [default: 12, or no limit where a time limit is given]
+    /// Most starts [default: 12, or 8 from 8 harmonics on; no limit where
+    /// a time limit is given]
     #[arg(long, allow_negative_numbers = true)]
     starts: Option<usize>,
     /// Wall clock of the optimisation in seconds [default: 25, or none where starts are given]
@@ -132,7 +134,10 @@ pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let plant = load(&args.robot, args.identify.as_deref())?.in_space(args.coordinates)?;
     let plant = args.collisions.apply(plant);
-    let usual = usual(args.question, args.payload.as_deref())?;
+    let mut usual = usual(args.question, args.payload.as_deref())?;
+    if args.question.is_none() {
+        usual.harmonics = harmonics(args.criterion, args.diagnostic);
+    }
     let settings = Settings {
         harmonics: args.harmonics.unwrap_or(usual.harmonics),
         period: args.period.unwrap_or(usual.period),
@@ -263,6 +268,14 @@ pub fn usual(question: Option<Question>, payload: Option<&str>) -> Result<Settin
         (_, Some(_)) => Err(Error::Argument(
             "--payload names the load of --for load; excite identifiability --payload judges any trajectory by it".into(),
         )),
+    }
+}
+
+/// Harmonics where none are asked for. The motions of a diagnostic set have odd ones only, which reach twice as far.
+pub fn harmonics(criterion: Criterion, diagnostic: bool) -> usize {
+    match diagnostic {
+        true => Settings::default().harmonics,
+        false => criterion.harmonics(),
     }
 }
 

@@ -51,6 +51,17 @@ pub enum Criterion {
     Known,
 }
 
+impl Criterion {
+    /// Harmonics where none are asked for: fast ones excite the small links, and one parameter more becomes known. The
+    /// others stay with five, as the literature has them.
+    pub fn harmonics(self) -> usize {
+        match self {
+            Criterion::Known => 8,
+            _ => 5,
+        }
+    }
+}
+
 /// Which matrix the eigenvalues are taken of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]

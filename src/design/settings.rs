@@ -40,7 +40,7 @@ pub struct Settings {
     pub derate: f64,
     /// seed of the random starts
     pub seed: u64,
-    /// most starts; where neither this nor a time limit is given, 12 within 25 s
+    /// most starts; where neither this nor a time limit is given, 12 within 25 s, from 8 harmonics on 8
     #[serde(skip_serializing_if = "Option::is_none")]
     pub starts: Option<usize>,
     /// wall clock of the optimisation, s; given alone, starts go on until it ends
@@ -79,6 +79,8 @@ impl Settings {
     /// Most starts and seconds, with the defaults filled in.
     pub fn budget(&self) -> (usize, f64) {
         match (self.starts, self.time_limit) {
+            // more harmonics make a start longer
+            (None, None) if self.harmonics >= 8 => (8, 25.0),
             (None, None) => (12, 25.0),
             (Some(starts), None) => (starts, f64::INFINITY),
             (None, Some(seconds)) => (usize::MAX, seconds),
