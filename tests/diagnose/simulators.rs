@@ -138,5 +138,5 @@ fn every_effect_in_mujoco_springs_and_encoders() {
 
 #[test]
 fn every_effect_in_mujoco_swinging() {
-    left_in_mujoco(&["backlash", "base_compliance"]);
+    left_in_mujoco(&["joint_elasticity", "backlash", "base_compliance"]);
 }

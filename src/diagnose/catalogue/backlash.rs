@@ -68,9 +68,15 @@ impl Effect for Backlash {
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
         let j = place.first();
         let spring = |r: &Series, k: usize| {
-            let span = cx.data.span(k);
-            let (load, mass) = (&cx.rigid[j][span.clone()], &cx.mass[j][j][span]);
-            spring::way(load, mass, r.dt, shape[0], shape[1], shape[2], 0.0, r.cycle)
+            spring::way(
+                spring::carried(cx, j, k),
+                r.dt,
+                shape[0],
+                shape[1],
+                shape[2],
+                0.0,
+                r.cycle,
+            )
         };
         if draft {
             let mut all = Vec::with_capacity(cx.data.rows());

@@ -1,6 +1,7 @@
 //! The base tilts on springs under the moment that the robot exerts on it: `M δ̈ + D δ̇ + K δ = −τ_base`
 //! about each axis, with the inertia `M` of the robot about the base.
 
+use super::spring::Carried;
 use super::*;
 
 /// Base compliance.
@@ -73,8 +74,13 @@ impl Effect for BaseCompliance {
         };
         tilted(cx, |r, k, axis| {
             let span = cx.data.span(k);
-            let (moment, mass) = (&load.moment[axis][span.clone()], &load.mass[axis][span]);
-            spring::way(moment, mass, r.dt, 0.0, shape[0], shape[1], 0.0, r.cycle)
+            let carried = Carried {
+                load: &load.moment[axis][span.clone()],
+                mass: &load.mass[axis][span],
+                slopes: [&[], &[]],
+                measured: &r.measured,
+            };
+            spring::way(carried, r.dt, 0.0, shape[0], shape[1], 0.0, r.cycle)
         })
     }
 

@@ -14,6 +14,9 @@ use crate::robot::{JointTerm, Motion};
 use crate::signals::series::Series;
 use std::sync::OnceLock;
 
+/// Step of the differences by which the torque of a joint is derived, rad or m, and of its rate.
+const STEP: f64 = 1e-5;
+
 /// State of the diagnosis that columns may depend on.
 pub struct Context<'a> {
     /// the records
@@ -28,6 +31,8 @@ pub struct Context<'a> {
     pub peak: Vec<f64>,
     /// column `j` of the mass matrix over all records: `mass[j][i]` is `M_ij` (serial robots)
     pub mass: Vec<Vec<Vec<f64>>>,
+    /// how the torque of each joint changes with its position and velocity, once it was asked for (serial robots)
+    slopes: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// what the robot exerts on its base, once it was asked for
     base: OnceLock<Option<base_compliance::Load>>,
     /// what other geometry changes, once it was asked for
@@ -69,8 +74,32 @@ impl<'a> Context<'a> {
             rigid,
             peak,
             mass,
+            slopes: (0..data.joints()).map(|_| OnceLock::new()).collect(),
             base: OnceLock::new(),
             deformations: OnceLock::new(),
+        })
+    }
+
+    /// How the rigid-body torque of joint `j` changes with its position and with its velocity, over all records; empty
+    /// where that cannot be had.
+    pub(crate) fn slopes(&self, j: usize) -> &[Vec<f64>; 2] {
+        self.slopes[j].get_or_init(|| {
+            [0, 1].map(|rate| {
+                let side = |step: f64| {
+                    self.data.torque_of(&self.phi, |r, _, x: &mut Samples| {
+                        let all = if rate == 0 { &mut x.q } else { &mut x.qd };
+                        all[j * r.count..(j + 1) * r.count]
+                            .iter_mut()
+                            .for_each(|v| *v += step);
+                    })
+                };
+                match (side(STEP), side(-STEP)) {
+                    (Ok(plus), Ok(minus)) => (plus[j].iter().zip(&minus[j]))
+                        .map(|(a, b)| (a - b) / (2.0 * STEP))
+                        .collect(),
+                    _ => Vec::new(),
+                }
+            })
         })
     }
 

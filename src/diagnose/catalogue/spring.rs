@@ -5,14 +5,41 @@ use crate::diagnose::window::{FINE, from_fine};
 
 /// How much of the begin of a record without periods is run through first, s.
 const BACK: f64 = 2.0;
+/// Damping ratio on that way.
+const DRAINED: f64 = 0.5;
 
-/// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J`, where `T`
-/// is the torque of flanks at `±b/2` with springs of `M (2πf)²` and a damping ratio; the springs
+/// What a spring carries, sample by sample.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Carried<'a> {
+    /// torque `τ_J` of the rigid bodies where the link is at the motor
+    pub load: &'a [f64],
+    /// inertia about the joint
+    pub mass: &'a [f64],
+    /// how the torque changes with the way of the link and with its rate, `∂τ_J/∂q` and `∂τ_J/∂q̇`; empty: not at all
+    pub slopes: [&'a [f64]; 2],
+    /// whether motion and torque of a sample rest on measured values; a record that is cut out of a motion has no
+    /// accelerations at its ends
+    pub measured: &'a [bool],
+}
+
+/// What a spring in joint `j` carries in record `k` (serial robots).
+pub(crate) fn carried<'a>(cx: &'a Context, j: usize, k: usize) -> Carried<'a> {
+    let span = cx.data.span(k);
+    let slopes = cx.slopes(j);
+    Carried {
+        load: &cx.rigid[j][span.clone()],
+        mass: &cx.mass[j][j][span.clone()],
+        slopes: [0, 1].map(|rate| slopes[rate].get(span.clone()).unwrap_or(&[])),
+        measured: &cx.data.records[k].measured,
+    }
+}
+
+/// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J − ∂τ_J/∂q δ − ∂τ_J/∂q̇ δ̇`, where
+/// `T` is the torque of flanks at `±b/2` with springs of `M (2πf)²` and a damping ratio; the springs
 /// stiffen by `cubic` at the largest load. Averaged as torque is measured.
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn way(
-    load: &[f64],
-    mass: &[f64],
+    carried: Carried,
     dt: f64,
     gap: f64,
     frequency: f64,
@@ -20,6 +47,13 @@ pub(crate) fn way(
     cubic: f64,
     cycle: Option<usize>,
 ) -> [Vec<f64>; 3] {
+    let Carried {
+        load,
+        mass,
+        slopes: [stiff, drag],
+        measured,
+    } = carried;
+    let slope = |of: &[f64], i: usize| of.get(i).copied().unwrap_or(0.0);
     let omega = 2.0 * std::f64::consts::PI * frequency;
     let n = load.len();
     // sub-steps of the springs, finer than those of the average
@@ -29,39 +63,61 @@ pub(crate) fn way(
     let k = mean * omega * omega;
     let d = 2.0 * damping * mean * omega;
     let twist = load.iter().fold(1e-12f64, |m, v| m.max(v.abs())) / k;
+    // what lies between the ends that say nothing
+    let (first, last) = match (cycle, measured.iter().position(|m| *m)) {
+        (None, Some(first)) => (first, measured.iter().rposition(|m| *m).unwrap_or(n - 1)),
+        _ => (0, n - 1),
+    };
+    let back = (first + (BACK / dt) as usize).min(last);
     let begin = match cycle {
         Some(_) => load[0],
-        None => load[((BACK / dt) as usize).min(n - 1)],
+        None => load[back],
     };
     let (mut x, mut v) = (-gap / 2.0 * begin.signum() - begin / k, 0.0);
     let mut values: [Vec<f64>; 3] = Default::default();
     let settle = cycle.unwrap_or(0).min(n - 1);
     if cycle.is_none() {
-        // a record may begin in the middle of a motion: backwards through its begin with a damping of one half, so that
-        // nothing swings from the start
-        let back = ((BACK / dt) as usize).min(n - 1);
-        for i in (0..back).rev() {
-            let (m, steps) = (mass[i].max(0.05 * mean), FINE * sub);
-            for s in 0..steps {
-                let tau = load[i + 1] + s as f64 / steps as f64 * (load[i] - load[i + 1]);
-                let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
-                v += h * (-k * beyond - mean * omega * v - tau) / m;
-                x += h * v;
+        // a record may begin in the middle of a motion: backwards through its begin, so that nothing swings from the start
+        let start = (x, v);
+        let backwards = |ratio: f64| {
+            let ((mut x, mut v), drained) = (start, 2.0 * ratio * mean * omega);
+            for i in (first..back).rev() {
+                let (m, steps) = (mass[i].max(0.05 * mean), FINE * sub);
+                for s in 0..steps {
+                    let tau = load[i + 1] + s as f64 / steps as f64 * (load[i] - load[i + 1]);
+                    let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
+                    let tau = tau + slope(stiff, i) * x;
+                    v += h * (-k * beyond - drained * v - tau) / m;
+                    x += h * v;
+                }
             }
+            (x, -v)
+        };
+        (x, v) = backwards(DRAINED);
+        // seen backwards, a swing is fed: from two that are drained towards the one that is not
+        if gap == 0.0 {
+            let half = backwards(0.5 * DRAINED);
+            let on = (0.5 * DRAINED + damping) / (0.5 * DRAINED);
+            (x, v) = (half.0 + on * (half.0 - x), half.1 + on * (half.1 - v));
         }
-        v = -v;
     }
     for pass in 0..2 {
         let upto = if pass == 0 { settle } else { n };
-        for i in 0..upto {
-            let next = (i + 1).min(n - 1);
+        if pass == 1 {
+            values[0].resize(first * FINE, x);
+            values[1].resize(first * FINE, v);
+            values[2].resize(first * FINE, 0.0);
+        }
+        for i in first..upto {
+            let next = (i + 1).min(last);
             let m = mass[i].max(0.05 * mean);
+            let (stiff, drag) = (slope(stiff, i), slope(drag, i));
             for s in 0..FINE {
                 let mut sum = 0.0;
                 let begin = (x, v);
                 for u in 0..sub {
                     let w = (s * sub + u) as f64 / (FINE * sub) as f64;
-                    let tau = load[i] + w * (load[next] - load[i]);
+                    let tau = load[i.min(last)] + w * (load[next] - load[i.min(last)]);
                     let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
                     let mut t = -k * beyond * (1.0 + cubic * (beyond / twist).powi(2).min(9.0));
                     // flanks push only while they touch
@@ -71,7 +127,7 @@ pub(crate) fn way(
                         let damped = t - d * v;
                         t = if damped * t > 0.0 { damped } else { 0.0 };
                     }
-                    let a = (t - tau) / m;
+                    let a = (t - tau - stiff * x - drag * v) / m;
                     sum += a;
                     v += h * a;
                     x += h * v;
@@ -106,4 +162,66 @@ pub(crate) fn constants(cx: &Context, j: usize, frequency: f64, damping: f64) ->
         2.0 * damping * mean * omega,
         cx.peak[j] / stiffness,
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four periods of a load with a harmonic at a third of the resonance, 250 Hz.
+    fn load(n: usize) -> Vec<f64> {
+        let at = |i: usize, f: f64| (2.0 * std::f64::consts::PI * f * i as f64 / 250.0).sin();
+        (0..n)
+            .map(|i| 20.0 * at(i, 0.25) + 6.0 * at(i, 2.25) - 9.0)
+            .collect()
+    }
+
+    /// A record that was cut out of a motion swings as the motion that repeats does, from its first sample on, whatever
+    /// its ends say.
+    #[test]
+    fn a_record_that_is_cut_out_of_a_motion_swings_as_the_motion_does() {
+        let (n, cycle) = (4000, 1000);
+        let (good, mass, stiff) = (load(n), vec![1.2; n], vec![-30.0; n]);
+        let whole = Carried {
+            load: &good,
+            mass: &mass,
+            slopes: [&stiff, &[]],
+            measured: &vec![true; n],
+        };
+        let truth = way(whole, 0.004, 0.0, 6.5, 0.06, 0.0, Some(cycle));
+        // 26 samples at either end have no accelerations
+        let (mut spoiled, mut measured) = (good.clone(), vec![true; n]);
+        for i in (0..26).chain(n - 26..n) {
+            spoiled[i] += if i < 26 { -19.0 } else { 19.0 };
+            measured[i] = false;
+        }
+        let cut = Carried {
+            load: &spoiled,
+            measured: &measured,
+            ..whole
+        };
+        let found = way(cut, 0.004, 0.0, 6.5, 0.06, 0.0, None);
+        for (k, name) in ["way", "rate", "acceleration"].iter().enumerate() {
+            let size = truth[k].iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            let off = (30..n - 30).fold(0.0f64, |m, i| m.max((found[k][i] - truth[k][i]).abs()));
+            assert!(off < 0.03 * size, "{name}: {off} of {size}");
+        }
+    }
+
+    /// Under a constant load with a slope the link stands where spring, load and slope balance.
+    #[test]
+    fn the_slope_of_the_load_makes_a_spring_softer() {
+        let n = 2000;
+        let (load, mass, stiff) = (vec![-10.0; n], vec![1.0; n], vec![-100.0; n]);
+        let carried = Carried {
+            load: &load,
+            mass: &mass,
+            slopes: [&stiff, &[]],
+            measured: &vec![true; n],
+        };
+        let k = (2.0 * std::f64::consts::PI * 5.0f64).powi(2);
+        let found = way(carried, 0.004, 0.0, 5.0, 0.1, 0.0, None);
+        let stands = 10.0 / (k - 100.0);
+        assert!((found[0][n - 1] / stands - 1.0).abs() < 1e-3);
+    }
 }

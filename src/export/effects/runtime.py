@@ -187,20 +187,41 @@ def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
             data.qvel[free] = 0.98 * (data.qvel[free] + substep * pushed(q[i], dq[i], ddq[i], 0.0))
             data.qpos[at] += substep * data.qvel[free]
 
+    def backwards(drained):
+        # through the first two seconds, so that nothing swings from the start
+        rest(min(int(2.0 / dt), len(q) - 1))
+        data.qvel[free] = 0.0
+        for i in range(min(int(2.0 / dt), len(q) - 1), 0, -1):
+            for s in range(count):
+                w = s / count
+                state = [(1 - w) * x[i] + w * x[i - 1] for x in (q, -dq, ddq)]
+                data.qvel[free] *= 1.0 - min(drained * dt / count, 0.5)
+                data.qvel[free] += dt / count * pushed(*state, 0.0)
+                data.qpos[at] += dt / count * data.qvel[free]
+        return data.qpos[at].copy(), -data.qvel[free]
+
+    def begin():
+        # seen backwards, a swing is fed: from two that are drained towards the one that is not
+        data.qpos[here.at] = q[0]
+        mujoco.mj_forward(model, data)
+        damping = model.dof_damping.copy()
+
+        def rate(dof):
+            one, column = np.zeros(model.nv), np.zeros(model.nv)
+            one[dof] = 1.0
+            mujoco.mj_mulM(model, data, column, one)
+            return np.ravel(damping[dof])[0] / max(column[dof], 1e-9)
+
+        least = 15.0 + 2.0 * max(rate(dof) for dof in free)
+        model.dof_damping[free] *= -1.0
+        near, far = backwards(least), backwards(2.0 * least)
+        model.dof_damping[:] = damping
+        data.qpos[at], data.qvel[free] = (2.0 * a - b for a, b in zip(near, far))
+
     try:
         count = max(int(np.ceil(dt / substep)), 1)
         if len(free):
-            rest(0)
-            # through the first two seconds backwards with more damping, so that nothing swings from the start
-            data.qvel[free] = 0.0
-            for i in range(min(int(2.0 / dt), len(q) - 1), 0, -1):
-                for s in range(count):
-                    w = s / count
-                    state = [(1 - w) * x[i] + w * x[i - 1] for x in (q, -dq, ddq)]
-                    data.qvel[free] *= 1.0 - min(60.0 * dt / count, 0.5)
-                    data.qvel[free] += dt / count * pushed(*state, 0.0)
-                    data.qpos[at] += dt / count * data.qvel[free]
-            data.qvel[free] *= -1.0
+            begin()
         for i in range(len(q)):
             if len(free):
                 data.qacc[free] = pushed(q[i], dq[i], ddq[i], i * dt)
