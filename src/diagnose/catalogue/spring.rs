@@ -5,8 +5,8 @@ use crate::diagnose::window::{FINE, from_fine};
 
 /// How much of the begin of a record without periods is run through first, s.
 const BACK: f64 = 2.0;
-/// Damping ratio on that way.
-const DRAINED: f64 = 0.5;
+/// Damping ratios on that way.
+const DRAINED: [f64; 3] = [0.1, 0.2, 0.3];
 
 /// What a spring carries, sample by sample.
 #[derive(Debug, Clone, Copy)]
@@ -91,15 +91,30 @@ pub(crate) fn way(
                     x += h * v;
                 }
             }
-            (x, -v)
+            // rates of the scheme are those half a step ago, here half a step ahead
+            let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
+            let tau = load[first] + slope(stiff, first) * x;
+            (
+                x,
+                -v + h * (k * beyond + tau) / mass[first].max(0.05 * mean),
+            )
         };
-        (x, v) = backwards(DRAINED);
-        // seen backwards, a swing is fed: from two that are drained towards the one that is not
-        if gap == 0.0 {
-            let half = backwards(0.5 * DRAINED);
-            let on = (0.5 * DRAINED + damping) / (0.5 * DRAINED);
-            (x, v) = (half.0 + on * (half.0 - x), half.1 + on * (half.1 - v));
-        }
+        (x, v) = match gap == 0.0 {
+            false => backwards(0.5),
+            // seen backwards, a swing is fed: from three that are drained towards the one that is not, by a parabola
+            true => {
+                let weight = |i: usize| -> f64 {
+                    let others = (0..DRAINED.len()).filter(|&j| j != i);
+                    others
+                        .map(|j| (-damping - DRAINED[j]) / (DRAINED[i] - DRAINED[j]))
+                        .product()
+                };
+                (0..DRAINED.len()).fold((0.0, 0.0), |sum, i| {
+                    let (state, w) = (backwards(DRAINED[i]), weight(i));
+                    (sum.0 + w * state.0, sum.1 + w * state.1)
+                })
+            }
+        };
     }
     for pass in 0..2 {
         let upto = if pass == 0 { settle } else { n };
