@@ -97,7 +97,7 @@ fn draw(
     area.fill(&WHITE).map_err(|e| wrong(&e))?;
     let mut chart = ChartBuilder::on(&area)
         .caption(
-            format!("Names in {cases} withheld cases"),
+            format!("How often names are right: {cases} withheld cases"),
             ("sans-serif", 20),
         )
         .margin(14)
@@ -107,7 +107,7 @@ fn draw(
         .map_err(|e| wrong(&e))?;
     chart
         .configure_mesh()
-        .x_desc("confidence that was stated")
+        .x_desc("confidence that was stated (beside each point: number of names; bars: 95 %)")
         .y_desc("share of the names that is right")
         .light_line_style(WHITE)
         .label_style(("sans-serif", 14))
@@ -122,7 +122,7 @@ fn draw(
         let bar = LineSeries::new([(b.stated, low), (b.stated, high)], blue.stroke_width(2));
         chart.draw_series(bar).map_err(|e| wrong(&e))?;
         let point = Circle::new((b.stated, share), 5, blue.filled());
-        let side = if b.stated > 0.85 { -44 } else { 9 };
+        let side = if b.stated > 0.85 { -24 } else { 9 };
         let number = EmptyElement::at((b.stated, share))
             + Text::new(format!("{}", b.count), (side, -6), ("sans-serif", 14));
         chart.draw_series([point]).map_err(|e| wrong(&e))?;

@@ -3,8 +3,8 @@
 use super::Context;
 use crate::diagnose::window::{FINE, from_fine};
 
-/// How much of the begin of a record without periods is run through first, s.
-const BACK: f64 = 2.0;
+/// How much of the begin of a record without periods is run through first: s at most, and swings of the spring.
+const BACK: (f64, f64) = (2.0, 10.0);
 /// Damping ratios on that way.
 const DRAINED: [f64; 3] = [0.1, 0.2, 0.3];
 
@@ -68,7 +68,7 @@ pub(crate) fn way(
         (None, Some(first)) => (first, measured.iter().rposition(|m| *m).unwrap_or(n - 1)),
         _ => (0, n - 1),
     };
-    let back = (first + (BACK / dt) as usize).min(last);
+    let back = (first + (BACK.0.min(BACK.1 / frequency) / dt) as usize).min(last);
     let begin = match cycle {
         Some(_) => load[0],
         None => load[back],
