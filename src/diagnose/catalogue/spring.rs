@@ -4,7 +4,7 @@ use super::Context;
 use crate::diagnose::window::{FINE, from_fine};
 
 /// How much of the begin of a record without periods is run through first: s at most, and swings of the spring.
-const BACK: (f64, f64) = (2.0, 10.0);
+const BACK: (f64, f64) = (2.0, 15.0);
 /// Damping ratios on that way.
 const DRAINED: [f64; 3] = [0.1, 0.2, 0.3];
 
