@@ -218,6 +218,31 @@ fn inflation(stack: &Stack) -> Result<f64> {
 }
 
 impl Factor {
+    /// Both together, as parts of one log: the first one's name stands for both, and a warning that both have in other
+    /// words is there once.
+    ///
+    /// # Errors
+    /// As [`Factor::with`].
+    pub fn and_then(self, next: Factor) -> Result<Factor> {
+        let known = self.header.warnings.clone();
+        let names = self.header.parts.each_ref().map(|p| p.records.clone());
+        let mut both = self.with(next)?;
+        let new = both.header.warnings.split_off(known.len());
+        let said = |w: &Warning| {
+            known
+                .iter()
+                .any(|k| k.kind == w.kind && k.subject == w.subject)
+        };
+        let new = new.into_iter().filter(|w| !said(w));
+        both.header.warnings.extend(new);
+        for (part, names) in both.header.parts.iter_mut().zip(names) {
+            if !names.is_empty() {
+                part.records = names;
+            }
+        }
+        Ok(both)
+    }
+
     /// Both together.
     ///
     /// # Errors
