@@ -31,20 +31,40 @@ fn radix2<const CONJUGATE: bool>(x: &mut [Complex], roots: &[Complex]) {
             x.swap(i, j);
         }
     }
+    let turn = |w: Complex| if CONJUGATE { [w[0], -w[1]] } else { w };
     let mut half = 1;
-    while half < n {
-        let stage = &roots[half - 1..2 * half - 1];
-        for part in x.chunks_exact_mut(2 * half) {
-            let (low, high) = part.split_at_mut(half);
-            for ((a, b), w) in low.iter_mut().zip(high).zip(stage) {
-                let w = if CONJUGATE { [w[0], -w[1]] } else { *w };
-                let (u, v) = (*a, mul(*b, w));
-                *a = [u[0] + v[0], u[1] + v[1]];
-                *b = [u[0] - v[0], u[1] - v[1]];
+    // two stages at a time, which go through the memory once
+    while 2 * half < n {
+        let first = &roots[half - 1..2 * half - 1];
+        let (second, third) = roots[2 * half - 1..4 * half - 1].split_at(half);
+        for part in x.chunks_exact_mut(4 * half) {
+            let (a, rest) = part.split_at_mut(half);
+            let (b, rest) = rest.split_at_mut(half);
+            let (c, d) = rest.split_at_mut(half);
+            let values = a.iter_mut().zip(b).zip(c.iter_mut().zip(d));
+            let weights = first.iter().zip(second.iter().zip(third));
+            for (((a, b), (c, d)), (w, (u, v))) in values.zip(weights) {
+                let (w, u, v) = (turn(*w), turn(*u), turn(*v));
+                let ([p, q], [r, s]) = (fly(*a, *b, w), fly(*c, *d, w));
+                [*a, *c] = fly(p, r, u);
+                [*b, *d] = fly(q, s, v);
             }
         }
-        half *= 2;
+        half *= 4;
     }
+    if half < n {
+        let (low, high) = x.split_at_mut(half);
+        for ((a, b), w) in low.iter_mut().zip(high).zip(&roots[half - 1..]) {
+            [*a, *b] = fly(*a, *b, turn(*w));
+        }
+    }
+}
+
+/// Two values of a stage.
+#[inline]
+fn fly(a: Complex, b: Complex, w: Complex) -> [Complex; 2] {
+    let v = mul(b, w);
+    [[a[0] + v[0], a[1] + v[1]], [a[0] - v[0], a[1] - v[1]]]
 }
 
 /// Roots of unity of all stages of a transform of this power of two, in the order of their use.
