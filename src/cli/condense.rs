@@ -1,7 +1,7 @@
 //! `excite condense EXPERIMENT`.
 
 use super::{identify::columns, outside, print, warn};
-use excite::identify::{Settings, condense};
+use excite::identify::{Factor, Settings, condense};
 use excite::log::{Experiment, Purpose, Record};
 use excite::output::{prepare_dir, write_atomic};
 use excite::{Error, Plant, Result};
@@ -15,7 +15,8 @@ use std::path::PathBuf;
                   in place of a log of any length.\n\nOne file for all records of an experiment, with those for \
                   the fit and the holdout ones apart. Factors add where robot, columns and cut-off are the same.",
     after_help = "Examples:\n  excite condense experiment.toml --cutoff 20 --output day1.factor\n  excite condense run1.csv \
-                  --robot arm.toml --period 10 --cutoff 20\n  excite merge day1.factor day2.factor"
+                  --robot arm.toml --period 10 --cutoff 20\n  excite condense day.csv --robot arm.toml --cutoff 20 \
+                  --rows 250000\n  excite merge day1.factor day2.factor"
 )]
 pub struct Args {
     /// experiment.toml, or with --robot one log
@@ -30,6 +31,10 @@ pub struct Args {
     /// bandwidth of the motion]
     #[arg(long, value_name = "HZ")]
     cutoff: Option<f64>,
+    /// Read a log that is too long for the memory in parts of so many rows, each a record of its own: of a CSV with the
+    /// columns t, q1…, tau1…, with the cut-off that all parts share
+    #[arg(long, value_name = "N", requires_all = ["robot", "cutoff"])]
+    rows: Option<usize>,
     /// Do not average the periods of motion that repeats
     #[arg(long)]
     no_average: bool,
@@ -60,36 +65,57 @@ pub fn run(args: Args) -> Result<()> {
         &[&name.to_string_lossy()],
         args.force,
     )?;
-    let mut notes = Vec::new();
-    let mut experiment = match args.robot {
-        Some(spec) => {
-            let plant = Plant::load(&spec)?;
-            let record = Record::read(&args.record, &plant, Purpose::Fit, args.period)?;
-            Experiment {
-                path: args.record,
-                spec,
-                plant,
-                records: vec![record],
-            }
-        }
-        None => Experiment::read(&args.record)?,
-    };
-    experiment.press(outside(args.atmosphere)?)?;
-    let Experiment {
-        spec,
-        plant,
-        records,
-        ..
-    } = experiment;
-    notes.extend(excite::survey::check(&plant, &records)?);
-    let plant = columns(plant, args.identify.as_deref(), &mut notes)?;
     let mut settings = Settings::default();
     settings.signals.cutoff = args.cutoff;
     settings.signals.average = !args.no_average;
     settings.signals.measured_rates = !args.derive;
+    let atmosphere = outside(args.atmosphere)?;
     let asked = args.identify.as_deref();
-    let mut factor = condense(&plant, &spec, asked, &records, &settings)?;
-    factor.header.warnings.splice(0..0, notes);
+    let whole = |mut experiment: Experiment| -> Result<Factor> {
+        experiment.press(atmosphere)?;
+        let Experiment {
+            spec,
+            plant,
+            records,
+            ..
+        } = experiment;
+        let mut notes = excite::survey::check(&plant, &records)?;
+        let plant = columns(plant, asked, &mut notes)?;
+        let mut factor = condense(&plant, &spec, asked, &records, &settings)?;
+        factor.header.warnings.splice(0..0, notes);
+        Ok(factor)
+    };
+    let one = |spec: &str, plant: &Plant, record: Record| Experiment {
+        path: args.record.clone(),
+        spec: spec.to_string(),
+        plant: plant.clone(),
+        records: vec![record],
+    };
+    let (path, period) = (&args.record, args.period);
+    let factor = match (&args.robot, args.rows) {
+        (Some(spec), None) => {
+            let plant = Plant::load(spec)?;
+            let record = Record::read(path, &plant, Purpose::Fit, period)?;
+            whole(one(spec, &plant, record))?
+        }
+        (Some(spec), Some(rows)) => {
+            let plant = Plant::load(spec)?;
+            let mut sum: Option<Factor> = None;
+            Record::read_parts(path, &plant, Purpose::Fit, period, rows, &mut |record| {
+                let next = whole(one(spec, &plant, record))?;
+                sum = Some(match sum.take() {
+                    Some(all) => all.and_then(next)?,
+                    None => next,
+                });
+                Ok(())
+            })?;
+            let mut sum = sum.ok_or_else(|| Error::Argument("no part was read".into()))?;
+            let name = path.file_stem().unwrap_or_default().to_string_lossy();
+            sum.header.parts[0].records = vec![name.into_owned()];
+            sum
+        }
+        _ => whole(Experiment::read(path)?)?,
+    };
     warn(&factor.header.warnings);
     let bytes = factor.to_bytes()?;
     write_atomic(&output, args.force, |w| w.write_all(&bytes))?;

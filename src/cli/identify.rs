@@ -90,6 +90,10 @@ pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
     let mut experiment = Experiment::read(&args.experiment)?;
     experiment.press(outside(args.atmosphere)?)?;
+    // what only a diagnosis asks for
+    for record in &mut experiment.records {
+        record.written = None;
+    }
     let mut notes = excite::survey::check(&experiment.plant, &experiment.records)?;
     experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
     let mut settings = Settings {

@@ -218,11 +218,16 @@ pub fn of_logs(
         warnings.push(Warning::new(
             WarningKind::WorseThanNominal,
             plant.name(),
-            format!(
-                "with what was fitted {:.2} times the gap of the nominal model is left on holdout records; the robot \
-                 files hold the nominal model",
-                left(&after) / left(&frozen).max(1e-300)
-            ),
+            match left(&frozen) {
+                gap if gap > 0.0 => format!(
+                    "with what was fitted {:.2} times the gap of the nominal model is left on holdout records; the \
+                     robot files hold the nominal model",
+                    left(&after) / gap
+                ),
+                _ => "with what was fitted more is left on holdout records than with the nominal model, which leaves \
+                      nothing but noise there; the robot files hold the nominal model"
+                    .to_string(),
+            },
         ));
     }
     warnings.extend(payload::warnings(logs));

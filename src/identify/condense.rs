@@ -218,6 +218,35 @@ fn inflation(stack: &Stack) -> Result<f64> {
 }
 
 impl Factor {
+    /// Both together, as parts of one log: the first one's name stands for both. Of a warning that both have in other
+    /// words the first one's are kept, which then says so.
+    ///
+    /// # Errors
+    /// As [`Factor::with`].
+    pub fn and_then(self, next: Factor) -> Result<Factor> {
+        const LIKEWISE: &str = " (so in a part of the log, and likewise in others)";
+        let first = self.header.warnings.len();
+        let names = self.header.parts.each_ref().map(|p| p.records.clone());
+        let mut both = self.with(next)?;
+        let all = &mut both.header.warnings;
+        for w in all.split_off(first) {
+            let known = all[..first]
+                .iter_mut()
+                .find(|k| k.kind == w.kind && k.subject == w.subject);
+            match known {
+                None => all.push(w),
+                Some(k) if k.message == w.message || k.message.ends_with(LIKEWISE) => {}
+                Some(k) => k.message += LIKEWISE,
+            }
+        }
+        for (part, names) in both.header.parts.iter_mut().zip(names) {
+            if !names.is_empty() {
+                part.records = names;
+            }
+        }
+        Ok(both)
+    }
+
     /// Both together.
     ///
     /// # Errors

@@ -91,19 +91,41 @@ pub fn weighted(
         for (k, s) in range.clone().enumerate() {
             let l = weights.at(record, s);
             for a in 0..n {
-                let mut sum = 0.0;
-                for d in 0..n {
-                    let x = l[(a, d)];
-                    if x != 0.0 {
-                        let row = d * stack.count + s;
-                        sum += x * if c < b { stack.w[(row, c)] } else { tau[row] };
-                    }
-                }
-                out[(a * m + k, c)] = sum;
+                out[(a * m + k, c)] = weighted_at(stack, tau, l, [a, s, c]);
             }
         }
     }
     out
+}
+
+/// Weighted rows `[W τ]` of all samples of a record, of one actuator alone.
+pub fn weighted_row(
+    stack: &Stack,
+    tau: &[f64],
+    record: usize,
+    weights: &Weights,
+    a: usize,
+) -> Mat<f64> {
+    Mat::from_fn(stack.count, stack.w.ncols() + 1, |s, c| {
+        weighted_at(stack, tau, weights.at(record, s), [a, s, c])
+    })
+}
+
+/// Column `c` of the weighted row of actuator `a` at sample `s`.
+fn weighted_at(stack: &Stack, tau: &[f64], l: MatRef<'_, f64>, [a, s, c]: [usize; 3]) -> f64 {
+    let mut sum = 0.0;
+    for d in 0..stack.actuators {
+        let x = l[(a, d)];
+        if x != 0.0 {
+            let row = d * stack.count + s;
+            let value = match c < stack.w.ncols() {
+                true => stack.w[(row, c)],
+                false => tau[row],
+            };
+            sum += x * value;
+        }
+    }
+    sum
 }
 
 /// `[R r; 0 ρ]` of matrices put under each other.

@@ -32,7 +32,7 @@ pub fn left_out(
     }
     let mut out: Vec<Stack> = fit.iter().map(|s| (*s).clone()).collect();
     for (s, p) in out.iter_mut().zip(prepared) {
-        let motion = plant.actuator_motion(&p.motion)?;
+        let motion = plant.drive_motion(&p.motion)?;
         for &a in &dry {
             let row = a * p.count()..(a + 1) * p.count();
             let joint = standstill::Joint {

@@ -12,11 +12,11 @@
 //! West (1987) with the lag window replaced by its spectral counterpart and the residual taken as
 //! stationary, which halves its small-sample bias; for white residuals of unit variance `B = Λ`.
 
-use super::linear::{self, Weights, inverse_information, weighted};
+use super::linear::{self, Weights, inverse_information, weighted_row};
 use super::stack::Stack;
 use crate::error::Result;
 use crate::plant::Plant;
-use crate::signals::fourier::{Complex, transform};
+use crate::signals::fourier::{Complex, Plan};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -30,10 +30,10 @@ pub struct Covariance {
 }
 
 /// Two real signals transformed at once: half the work. Returns the first half of both spectra.
-fn pair(a: &[f64], b: &[f64]) -> [Vec<Complex>; 2] {
+fn pair(plan: &Plan, a: &[f64], b: &[f64]) -> [Vec<Complex>; 2] {
     let n = a.len();
     let z: Vec<Complex> = a.iter().zip(b).map(|(x, y)| [*x, *y]).collect();
-    let t = transform(&z, false);
+    let t = plan.transform(&z);
     let half = n / 2 + 1;
     let mut out = [Vec::with_capacity(half), Vec::with_capacity(half)];
     for k in 0..half {
@@ -46,9 +46,9 @@ fn pair(a: &[f64], b: &[f64]) -> [Vec<Complex>; 2] {
 
 /// Spectrum of a residual of which `used` samples are not left out (zero), 1 for white noise of unit
 /// variance, smoothed over about `√m` bins.
-fn smooth_spectrum(e: &[f64], used: usize) -> Vec<f64> {
+fn smooth_spectrum(plan: &Plan, e: &[f64], used: usize) -> Vec<f64> {
     let m = e.len();
-    let [s, _] = pair(e, e);
+    let [s, _] = pair(plan, e, e);
     let raw: Vec<f64> = s
         .iter()
         .map(|c| (c[0] * c[0] + c[1] * c[1]) / used.max(1) as f64)
@@ -92,11 +92,8 @@ pub fn covariance(
     let rows: usize = stacks.iter().map(|s| s.equations()).sum();
     let freedom = rows as f64 / (rows.saturating_sub(b)).max(1) as f64;
     let mut jobs = Vec::new();
-    let blocks: Vec<Mat<f64>> = stacks
-        .par_iter()
-        .enumerate()
-        .map(|(i, s)| weighted(s, &s.tau(), i, weights, 0..s.count))
-        .collect();
+    let right: Vec<Vec<f64>> = stacks.iter().map(|s| s.tau()).collect();
+    let plans: Vec<Plan> = stacks.iter().map(|s| Plan::new(s.count, false)).collect();
     for (i, s) in stacks.iter().enumerate() {
         jobs.extend((0..s.actuators).map(|a| (i, a)));
     }
@@ -104,16 +101,18 @@ pub fn covariance(
         .par_iter()
         .map(|&(i, a)| {
             let m = stacks[i].count;
-            let block = blocks[i].as_ref().subrows(a * m, m);
+            let plan = &plans[i];
+            // of one actuator at a time: all of them would be as large as the equations
+            let block = weighted_row(stacks[i], &right[i], i, weights, a);
             let column = |c: usize| -> Vec<f64> { (0..m).map(|k| block[(k, c)]).collect() };
             let residual: Vec<f64> = (0..m)
                 .map(|k| block[(k, b)] - (0..b).map(|c| block[(k, c)] * pi[c]).sum::<f64>())
                 .collect();
-            let density = smooth_spectrum(&residual, stacks[i].used(a));
+            let density = smooth_spectrum(plan, &residual, stacks[i].used(a));
             let half = density.len();
             let mut z = Mat::<f64>::zeros(2 * half, b);
             for c in (0..b).step_by(2) {
-                let spectra = pair(&column(c), &column((c + 1).min(b - 1)));
+                let spectra = pair(plan, &column(c), &column((c + 1).min(b - 1)));
                 for (d, spectrum) in spectra.iter().enumerate().take(b - c) {
                     for k in 0..half {
                         // frequencies between 0 and the highest stand for their mirror image too

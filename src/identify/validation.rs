@@ -7,6 +7,7 @@ use super::trace::Trace;
 use crate::error::Result;
 use crate::log::Purpose;
 use crate::signals::{self, Prepared};
+use std::borrow::Cow;
 
 /// Residual of one joint.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -69,12 +70,12 @@ pub fn validate(equations: &Equations, models: [&[f64]; 3]) -> Result<Validation
             ..equations.signals.clone()
         };
         let p = match again {
-            true => Prepared::new(r, plant, &whole)?,
-            false => q.clone(),
+            true => Cow::Owned(Prepared::new(r, plant, &whole)?),
+            false => Cow::Borrowed(q),
         };
         let stack = match again {
-            true => Stack::new(plant, base, &p)?,
-            false => s.clone(),
+            true => Cow::Owned(Stack::new(plant, base, &p)?),
+            false => Cow::Borrowed(s),
         };
         let velocity = plant.actuator_motion(&p.output_motion())?.qd;
         recorded.push((stack, velocity));
@@ -82,7 +83,7 @@ pub fn validate(equations: &Equations, models: [&[f64]; 3]) -> Result<Validation
     let errors = |purpose: Purpose, pi: &[f64]| -> Option<Errors> {
         let mine: Vec<&Stack> = recorded
             .iter()
-            .map(|(s, _)| s)
+            .map(|(s, _)| s.as_ref())
             .filter(|s| s.purpose == purpose)
             .collect();
         if mine.is_empty() {

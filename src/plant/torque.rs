@@ -142,9 +142,14 @@ impl Plant {
     /// # Errors
     /// As [`Plant::regressor`].
     pub fn actuator_motion(&self, x: &Samples) -> Result<Samples> {
+        Ok(self.drive_motion(x)?.into_owned())
+    }
+
+    /// The same without a copy where the coordinates are the actuators.
+    pub(crate) fn drive_motion<'a>(&self, x: &'a Samples) -> Result<Cow<'a, Samples>> {
         Ok(match self.joint_motion(x)? {
-            Cow::Borrowed(x) => x.clone(),
-            Cow::Owned(joints) => joints.rows(&self.actuated),
+            Cow::Borrowed(x) => Cow::Borrowed(x),
+            Cow::Owned(joints) => Cow::Owned(joints.rows(&self.actuated)),
         })
     }
 

@@ -384,6 +384,9 @@ fn assemble(series: Vec<Rates>) -> Samples {
         count,
         ..Samples::default()
     };
+    for x in [&mut out.q, &mut out.qd, &mut out.qdd] {
+        x.reserve_exact(series.len() * count);
+    }
     for [q, qd, qdd] in series {
         out.q.extend(q);
         out.qd.extend(qd);
@@ -420,11 +423,15 @@ fn scatter(parts: &[Vec<f64>], mean: &[f64], n: usize, samples: usize) -> Mat<f6
 
 /// Whether the first period is unlike the others.
 fn transient(q: &[Vec<f64>], from: usize, samples: usize, count: usize) -> bool {
+    let scaled: Vec<(&Vec<f64>, f64)> = q
+        .iter()
+        .map(|c| (c, c.iter().fold(0.0f64, |m, x| m.max(x.abs())).max(1e-12)))
+        .collect();
     let far = |a: usize, b: usize| -> f64 {
-        q.iter()
-            .map(|c| {
+        scaled
+            .iter()
+            .map(|(c, range)| {
                 let (a, b) = (from + a * samples, from + b * samples);
-                let range: f64 = c.iter().fold(0.0f64, |m, x| m.max(x.abs())).max(1e-12);
                 (0..samples)
                     .map(|i| ((c[a + i] - c[b + i]) / range).powi(2))
                     .sum::<f64>()
@@ -432,10 +439,20 @@ fn transient(q: &[Vec<f64>], from: usize, samples: usize, count: usize) -> bool 
             .sum()
     };
     let first = (1..count).map(|p| far(0, p)).sum::<f64>() / (count - 1) as f64;
-    let pairs: Vec<f64> = (1..count)
-        .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
-        .map(|(a, b)| far(a, b))
-        .collect();
-    let others = pairs.iter().sum::<f64>() / pairs.len().max(1) as f64;
+    // the mean over all pairs of `n` periods is 2/(n - 1) times the scatter about the mean period
+    let n = (count - 1) as f64;
+    let scatter: f64 = scaled
+        .iter()
+        .map(|(c, range)| {
+            (0..samples)
+                .map(|i| {
+                    let values = (1..count).map(|p| c[from + p * samples + i] / range);
+                    let mean = values.clone().sum::<f64>() / n;
+                    values.map(|x| (x - mean).powi(2)).sum::<f64>()
+                })
+                .sum::<f64>()
+        })
+        .sum();
+    let others = 2.0 * scatter / (n - 1.0).max(1.0);
     first > 9.0 * others + 1e-16 * samples as f64
 }

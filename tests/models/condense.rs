@@ -107,6 +107,99 @@ fn merged_factors_give_what_all_records_give() {
     }
 }
 
+/// A log that is read in parts is cut between rows, nowhere else, and its parts condensed one by one give what all of them
+/// together give.
+#[test]
+fn a_log_in_parts_is_the_same_log() {
+    let plant = plant();
+    let run = &records(&plant)[0];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("day.csv");
+    let mut text = String::from("t,q1,q2,tau1,tau2,mode\n");
+    for k in 0..run.len() {
+        let [q, tau] = [&run.q, &run.tau];
+        let numbers = [run.t[k], q[0][k], q[1][k], tau[0][k], tau[1][k]];
+        text += &numbers.map(|x| format!("{x:?}")).join(",");
+        text += ",auto\n";
+    }
+    std::fs::write(&path, text).unwrap();
+    let whole = Record::read(&path, &plant, Purpose::Fit, None).unwrap();
+    let rows = run.len() / 4 + 7;
+    let mut parts = Vec::new();
+    Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |part| {
+        parts.push(part);
+        Ok(())
+    })
+    .unwrap();
+    let sizes: Vec<usize> = parts.iter().map(Record::len).collect();
+    let last = *sizes.last().unwrap();
+    assert!(sizes.len() >= 3 && sizes[..sizes.len() - 1].iter().all(|n| *n == rows));
+    assert!(2 * last >= rows && 2 * last < 3 * rows, "{sizes:?}");
+    for j in 0..2 {
+        let channel = |of: fn(&Record) -> &Vec<Vec<f64>>| -> Vec<f64> {
+            parts.iter().flat_map(|p| of(p)[j].clone()).collect()
+        };
+        assert_eq!(channel(|r| &r.q), whole.q[j]);
+        assert_eq!(channel(|r| &r.tau), whole.tau[j]);
+    }
+
+    let mut factors = parts.iter().map(|p| of(&plant, std::slice::from_ref(p)));
+    let first = factors.next().unwrap();
+    let sum = factors.fold(first, |a, b| a.and_then(b).unwrap());
+    assert_eq!(sum.header.parts[0].records.len(), 1);
+    let wls = settings(Method::Wls);
+    let found = merged(&plant, &[&sum], &wls);
+    let together = identify(&plant, &parts, &wls).unwrap();
+    println!(
+        "base parameters off by {:.1e}",
+        off(&found.pi, &together.pi)
+    );
+    assert!(off(&found.pi, &together.pi) < 1e-10);
+    // what a cut costs are the samples beside it: an estimate from fewer samples
+    let at_once = identify(&plant, &[whole], &wls).unwrap();
+    for (k, pi) in found.pi.iter().enumerate() {
+        let apart = (pi - at_once.pi[k]).abs() / at_once.std[k];
+        assert!(apart < 3.0, "{k}: {apart} standard deviations");
+    }
+}
+
+/// Parts of a log with other names, parts of a few rows, and a log in which nothing moves are refused; a part that stands is
+/// left out.
+#[test]
+fn what_cannot_be_read_in_parts_is_refused() {
+    let plant = plant();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("day.csv");
+    let write = |header: &str, moving: &dyn Fn(usize) -> bool| {
+        let row = |k: usize| {
+            let q = if moving(k) {
+                (0.01 * k as f64).sin()
+            } else {
+                0.5
+            };
+            format!("{:?},{q:?},{q:?},{:?},{q:?}\n", 0.005 * k as f64, 2.0 * q)
+        };
+        let rows: String = (0..900).map(row).collect();
+        std::fs::write(&path, format!("{header}\n{rows}")).unwrap();
+    };
+    let read = |rows: usize| {
+        let mut count = 0;
+        let done = Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |_| {
+            count += 1;
+            Ok(())
+        });
+        done.map(|()| count).map_err(|e| e.to_string())
+    };
+    let ours = "t,q1,q2,tau1,tau2";
+    write(ours, &|k| !(300..600).contains(&k));
+    assert_eq!(read(300), Ok(2));
+    assert!(read(10).unwrap_err().contains("64 or more"));
+    write(ours, &|_| false);
+    assert!(read(300).unwrap_err().contains("nothing moves"));
+    write("time,p1,p2,f1,f2", &|_| true);
+    assert!(read(300).unwrap_err().contains("day.csv"));
+}
+
 /// Breakaway friction is asked for, and no factor can hold it: it is said, and `merge` says it again.
 #[test]
 fn breakaway_friction_is_not_condensed_in_silence() {

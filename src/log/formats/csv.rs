@@ -53,6 +53,20 @@ pub(crate) fn read<T>(
     wanted: &dyn Fn(&str) -> bool,
     check: &dyn Fn(&Table) -> Result<T>,
 ) -> Result<(Table, T)> {
+    read_parts(path, wanted, check, usize::MAX, &mut |_| Ok(()))
+}
+
+/// The same, but no more than `rows` and a half of them are held: as many rows are handed to `each` whenever there are
+/// so many, and what is returned are the last, at least half a part.
+pub(crate) fn read_parts<T>(
+    path: &Path,
+    wanted: &dyn Fn(&str) -> bool,
+    check: &dyn Fn(&Table) -> Result<T>,
+    rows: usize,
+    each: &mut dyn FnMut(Table) -> Result<()>,
+) -> Result<(Table, T)> {
+    let most = rows.saturating_add(rows / 2);
+    let mut given = 0;
     let mut checked = None;
     let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
     let size = file.metadata().map_or(0, |m| m.len());
@@ -90,7 +104,7 @@ pub(crate) fn read<T>(
         if layout.is_none() {
             let dialect = Dialect::of(text).ok_or_else(|| no_numbers(path, text))?;
             text = strip(text);
-            let each = text.iter().take(LINE).position(|b| *b == b'\n');
+            let first = text.iter().take(LINE).position(|b| *b == b'\n');
             for _ in 0..dialect.head {
                 let at = text.iter().position(|b| *b == b'\n');
                 text = at.map_or(&[], |at| &text[at + 1..]);
@@ -99,11 +113,11 @@ pub(crate) fn read<T>(
             let keep: Vec<bool> = (0..dialect.names.len())
                 .map(|k| dialect.cells[k] != Cell::Text && wanted(&dialect.names[k]))
                 .collect();
-            let rows = (size as usize / each.unwrap_or(80).max(8)).min(1 << 24);
+            let lines = (size as usize / first.unwrap_or(80).max(8)).min(1 << 24);
             table.names = dialect.names.clone();
             table.columns = vec![Vec::new(); table.names.len()];
             for (column, keep) in table.columns.iter_mut().zip(&keep) {
-                column.reserve(if *keep { rows / 2 } else { 0 });
+                column.reserve(if *keep { most.min(lines / 2) } else { 0 });
             }
             checked = Some(check(&table)?);
             layout = Some((dialect, keep));
@@ -127,6 +141,12 @@ pub(crate) fn read<T>(
             append(
                 &mut table, &text, dialect, keep, &mut line, cut_off, &mut left, path,
             );
+            while table.rows() >= most {
+                let mut part = first_rows(&mut table, rows);
+                without_texts(&mut part, dialect);
+                given += rows;
+                each(part)?;
+            }
         }
         block.copy_within(whole..filled, 0);
         filled -= whole;
@@ -134,7 +154,7 @@ pub(crate) fn read<T>(
             break;
         }
     }
-    let rows = table.rows();
+    let rows = given + table.rows();
     let (Some(checked), Some((dialect, keep))) = (checked, layout) else {
         return Err(no_numbers(path, &[]));
     };
@@ -165,7 +185,24 @@ pub(crate) fn read<T>(
     if rows == 0 && keep.contains(&true) {
         return Err(no_numbers(path, &[]));
     }
-    // a column of texts can be neither a time nor a measurement
+    without_texts(&mut table, &dialect);
+    Ok((table, checked))
+}
+
+/// Takes the first rows out of a table; columns that are not kept are empty.
+fn first_rows(table: &mut Table, rows: usize) -> Table {
+    let columns = table.columns.iter_mut();
+    Table {
+        names: table.names.clone(),
+        columns: columns
+            .map(|c| c.drain(..rows.min(c.len())).collect())
+            .collect(),
+        warnings: Vec::new(),
+    }
+}
+
+/// A column of texts can be neither a time nor a measurement.
+fn without_texts(table: &mut Table, dialect: &Dialect) {
     let texts: Vec<usize> = (0..table.names.len())
         .filter(|&k| dialect.cells[k] == Cell::Text)
         .collect();
@@ -173,7 +210,6 @@ pub(crate) fn read<T>(
         table.names.remove(k);
         table.columns.remove(k);
     }
-    Ok((table, checked))
 }
 
 fn no_numbers(path: &Path, text: &[u8]) -> Error {

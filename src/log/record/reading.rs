@@ -56,8 +56,6 @@ impl Record {
         };
         let table = match own(paths, reading)? {
             true => {
-                let known =
-                    |name: &str| name == "t" || POSE.contains(&name) || numbered(name).is_some();
                 let joints = plant.actuators();
                 let check = |table: &Table| check_names(table, &joints, path);
                 let (mut table, unknown) = csv::read(path, &known, &check)?;
@@ -68,6 +66,66 @@ impl Record {
         };
         Self::of_table(table, path, plant, purpose, period, reading.part)
     }
+
+    /// Reads a log of `plant` in parts of `rows` rows, one after the other, and hands each to `each` as a record of its
+    /// own: what is held at a time does not grow with the log. The last part has half as many rows at least, and up to
+    /// half as many again. A part in which no position changes is left out; it is a record without motion.
+    ///
+    /// # Errors
+    /// As [`Record::read`]; a log that is no CSV with the columns `t`, `q1` … and `tau1` …; fewer than 64 rows a part;
+    /// what `each` returns.
+    pub fn read_parts(
+        path: impl AsRef<Path>,
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+        rows: usize,
+        each: &mut dyn FnMut(Record) -> Result<()>,
+    ) -> Result<()> {
+        const LEAST: usize = 64;
+        let path = path.as_ref();
+        if rows < LEAST {
+            let message = format!("parts of {rows} rows are too short; take {LEAST} or more");
+            return Err(Error::Argument(message));
+        }
+        if !own(&[path.to_path_buf()], &Reading::default())? {
+            let message = "only a CSV with the columns t, q1…, tau1… can be read in parts; read it as a whole";
+            return Err(Error::file(path, "", message));
+        }
+        let joints = plant.actuators();
+        let (mut parts, mut still, mut used) = (0, 0, 0);
+        let mut take = |table: Table| -> Result<()> {
+            parts += 1;
+            let moves = |k: usize| {
+                let column = table.find(&format!("q{}", k + 1));
+                column.is_some_and(|c| table.columns[c].windows(2).any(|w| w[0] != w[1]))
+            };
+            if !(0..joints.len()).any(moves) {
+                still += 1;
+                return Ok(());
+            }
+            used += 1;
+            let mut record = Self::of_table(table, path, plant, purpose, period, [None; 2])?;
+            // what only a diagnosis asks for
+            record.written = None;
+            record.name = format!("{}[{parts}]", record.name);
+            each(record)
+        };
+        let check = |table: &Table| check_names(table, &joints, path);
+        let (mut last, unknown) = csv::read_parts(path, &known, &check, rows, &mut take)?;
+        last.warnings.extend(unknown);
+        take(last)?;
+        if used == 0 {
+            let message = format!("nothing moves in its {still} parts: no position changes");
+            return Err(Error::file(path, "", message));
+        }
+        Ok(())
+    }
+}
+
+/// Whether a column of this name is one of ours.
+fn known(name: &str) -> bool {
+    name == "t" || POSE.contains(&name) || numbered(name).is_some()
 }
 
 /// Whether it is a log with our names.

@@ -1,0 +1,182 @@
+//! Long logs, and a diagnosis of five: time, and the most memory that was held (Linux).
+//!
+//! ```sh
+//! cargo bench --bench long -- log 10        # millions of rows of seven joints: read, and condensed in parts
+//! cargo bench --bench long -- diagnose 5    # records of 20 s at 1 kHz of a clean Panda
+//! ```
+//!
+//! Each in a process of its own, because the memory is the most of the process.
+
+use excite::diagnose::{Settings as Diagnosis, diagnose};
+use excite::identify::{Factor, Settings, condense, merge};
+use excite::log::{Experiment, Purpose, Record, Table};
+use excite::robot::JointTerm;
+use excite::simulate::{Sensors, Settings as Simulation, measure, simulate, to_record};
+use excite::trajectory::{Fourier, Series};
+use excite::{Plant, Result};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+/// Rows of a part.
+const PART: usize = 250_000;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    // `cargo bench` hands over `--bench`; without it (`cargo test --benches`) little will do
+    let whole = words.iter().any(|a| a == "--bench");
+    let number = words.iter().find_map(|a| a.parse::<usize>().ok());
+    match words.iter().any(|a| a == "diagnose") {
+        true => diagnosis(number.unwrap_or(5), whole),
+        false => log(number.unwrap_or(1) * if whole { 1_000_000 } else { 4000 }),
+    }
+}
+
+/// A motion of the Panda that visits a good part of its joints' ranges.
+fn motion() -> Fourier {
+    let middle = [0.0, -0.3, 0.0, -2.0, 0.0, 1.8, 0.4];
+    let joint = |j: usize| Series {
+        constant: middle[j],
+        sin: (1..=4)
+            .map(|k| 0.4 * ((j + 2 * k) as f64).sin() / k as f64)
+            .collect(),
+        cos: (1..=4)
+            .map(|k| 0.3 * ((3 * j + k) as f64).cos() / k as f64)
+            .collect(),
+    };
+    Fourier {
+        period: 10.0,
+        harmonics: vec![1, 2, 3, 4],
+        joints: (0..7).map(joint).collect(),
+    }
+}
+
+fn run(plant: &Plant, periods: u32, seed: u64, purpose: Purpose) -> Result<Record> {
+    let (motion, settings) = (motion(), Simulation::default());
+    let run = simulate(plant, &motion, periods, &settings, &|_| {})?;
+    let measured = measure(&run, &Sensors::new(plant, 1.0).0, &settings.effects, seed);
+    Ok(to_record(&run, &measured, purpose, motion.period))
+}
+
+/// Most memory held so far, MB.
+fn peak() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    line.split_whitespace()
+        .nth(1)?
+        .parse()
+        .ok()
+        .map(|kb: f64| 1e-3 * kb)
+}
+
+fn said(what: &str, since: Instant, megabytes: f64) {
+    let seconds = since.elapsed().as_secs_f64();
+    let rate = match megabytes > 0.0 {
+        true => format!(", {:.0} MB/s", megabytes / seconds),
+        false => String::new(),
+    };
+    let most = peak().map_or(String::new(), |p| {
+        format!(", at most {p:.0} MB held so far")
+    });
+    println!("{what}: {seconds:.1} s{rate}{most}");
+}
+
+fn log(rows: usize) -> Result<(), Box<dyn std::error::Error>> {
+    let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
+    let plant = Plant::load("panda")?.with_terms(&terms);
+    let path = std::env::temp_dir().join(format!("excite_long_{}.csv", std::process::id()));
+    let done = generate(&plant, &path, rows).and_then(|()| long(&plant, &path, rows));
+    std::fs::remove_file(&path)?;
+    done
+}
+
+/// Ten periods, again and again.
+fn generate(plant: &Plant, path: &Path, rows: usize) -> Result<(), Box<dyn std::error::Error>> {
+    let record = run(plant, if rows > 50_000 { 10 } else { 1 }, 1, Purpose::Fit)?;
+    let lines: Vec<String> = (0..record.len())
+        .map(|i| {
+            let mut line = String::new();
+            for column in record.q.iter().chain(&record.tau) {
+                let _ = write!(line, ",{:.6}", column[i]);
+            }
+            line
+        })
+        .collect();
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    let names = ["q", "tau"].map(|g| (1..=7).map(|j| format!("{g}{j}")).collect::<Vec<_>>());
+    writeln!(file, "t,{}", names.concat().join(","))?;
+    for i in 0..rows {
+        writeln!(file, "{:.3}{}", 1e-3 * i as f64, lines[i % lines.len()])?;
+    }
+    file.flush()?;
+    Ok(())
+}
+
+fn long(plant: &Plant, path: &Path, rows: usize) -> Result<(), Box<dyn std::error::Error>> {
+    let size = 1e-6 * std::fs::metadata(path)?.len() as f64;
+    println!("{rows} rows of 15 columns, {size:.0} MB");
+    let each = PART.min(rows / 2);
+    let start = Instant::now();
+    let mut count = 0;
+    Record::read_parts(path, plant, Purpose::Fit, None, each, &mut |part| {
+        count += part.len();
+        Ok(())
+    })?;
+    assert_eq!(count, rows);
+    said("read and checked in parts", start, size);
+
+    let start = Instant::now();
+    let mut settings = Settings::default();
+    settings.signals.cutoff = Some(5.0);
+    let mut sum: Option<Factor> = None;
+    Record::read_parts(path, plant, Purpose::Fit, None, each, &mut |part| {
+        let next = condense(plant, "panda", None, &[part], &settings)?;
+        sum = Some(match sum.take() {
+            Some(all) => all.and_then(next)?,
+            None => next,
+        });
+        Ok(())
+    })?;
+    said("read and condensed in parts", start, size);
+    let start = Instant::now();
+    let model = merge(plant, sum.into_iter().collect(), &settings)?;
+    said("model from the factor", start, 0.0);
+    println!(
+        "{} base parameters, condition {:.0}",
+        model.pi.len(),
+        model.condition
+    );
+
+    // columns as they stand, and all of them: last, because it holds what the others need not
+    let start = Instant::now();
+    let table = Table::read(path, &|_| true)?;
+    assert_eq!(table.rows(), rows);
+    said("columns read at once", start, size);
+    Ok(())
+}
+
+fn diagnosis(count: usize, whole: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let plant = Plant::load("panda")?;
+    let periods = if whole { 2 } else { 1 };
+    let records = (0..count.max(2))
+        .map(|k| {
+            let last = k + 1 == count.max(2);
+            let purpose = if last { Purpose::Holdout } else { Purpose::Fit };
+            run(&plant, periods, k as u64, purpose)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let experiment = Experiment {
+        path: "bench".into(),
+        spec: "panda".into(),
+        plant,
+        records,
+    };
+    let start = Instant::now();
+    let mut settings = Diagnosis::default();
+    settings.next = whole;
+    let found = diagnose(&experiment, &settings, &|_| {})?;
+    said(&format!("diagnosis of {count} records"), start, 0.0);
+    println!("{:?}, {} findings", found.verdict, found.findings.len());
+    Ok(())
+}
