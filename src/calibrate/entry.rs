@@ -123,43 +123,24 @@ impl Entry {
         if !kind.is_loop() && (self.hold.is_some() || self.grip.is_some()) {
             return wrong("hold and grip are for kind = \"loop\"".into());
         }
-        let Some(g) = self.grip else {
-            return match self.grip_std {
-                None => Ok(None),
-                Some(_) => wrong("grip_std is that of grip, and there is none".into()),
-            };
-        };
-        if kind == Kind::Ball {
+        if kind == Kind::Ball && self.grip.is_some() {
             return wrong("grip is that of a rigid hold; where a ball joint sits is found".into());
         }
-        let std = self.grip_std.unwrap_or(GRIP_STD);
-        Ok(Some((
-            frame("grip", g, "the second frame in the first")?,
-            deviations("grip_std", std)?,
-        )))
+        let of = "the second frame in the first";
+        let found = stated("grip", self.grip, self.grip_std, of)?;
+        Ok(found.map(|k| (k.frame, k.std.unwrap_or(GRIP_STD))))
     }
 
     /// Where the base is known to stand before the instrument, and the target on the frame.
     pub(super) fn known(&self) -> Result<[Option<KnownPlace>; 2]> {
         let place = |key: &str, at: Option<[f64; 7]>, std: Option<[f64; 2]>, of: &str| {
-            let std_key = format!("{key}_std");
-            let Some(at) = at else {
-                return match std {
-                    None => Ok(None),
-                    Some(_) => Err(Error::Argument(format!(
-                        "{std_key} is that of {key}, and there is none"
-                    ))),
-                };
-            };
-            if !self.kind().has_instrument() {
+            let found = stated(key, at, std, of)?;
+            if found.is_some() && !self.kind().has_instrument() {
                 return Err(Error::Argument(format!(
                     "{key} is for measurements by a camera or a tracker: kind = \"pose\", \"pixels\" or \"position\""
                 )));
             }
-            Ok(Some(KnownPlace {
-                frame: frame(key, at, of)?,
-                std: std.map(|s| deviations(&std_key, s)).transpose()?,
-            }))
+            Ok(found)
         };
         Ok([
             place(
@@ -185,6 +166,26 @@ pub struct KnownPlace {
     pub frame: Frame,
     /// its standard deviations, m and rad; it is taken as exact without them
     pub std: Option<[f64; 2]>,
+}
+
+/// A place under `key`, with the standard deviations under `key_std`.
+fn stated(
+    key: &str,
+    at: Option<[f64; 7]>,
+    std: Option<[f64; 2]>,
+    of: &str,
+) -> Result<Option<KnownPlace>> {
+    let std_key = format!("{key}_std");
+    match (at, std) {
+        (None, None) => Ok(None),
+        (None, Some(_)) => Err(Error::Argument(format!(
+            "{std_key} is that of {key}, and there is none"
+        ))),
+        (Some(at), std) => Ok(Some(KnownPlace {
+            frame: frame(key, at, of)?,
+            std: std.map(|s| deviations(&std_key, s)).transpose()?,
+        })),
+    }
 }
 
 /// A pose as `x, y, z, qw, qx, qy, qz`.

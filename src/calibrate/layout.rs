@@ -7,10 +7,8 @@ use super::kind::Kind;
 use super::unknown::{Part, Unknown};
 use nalgebra::Vector3;
 
-/// Standard deviation of a place that is stated as exact, m and rad.
-const EXACT: f64 = 1e-9;
-/// Size by which columns of a stated place are scaled, m and rad.
-const KNOWN_SCALE: f64 = 0.01;
+/// Size by which columns are scaled whose prior does not say it, m and rad.
+const SCALE: f64 = 0.01;
 
 /// Where the unknowns of the set-up begin, by measurement.
 #[derive(Debug, Clone, Default)]
@@ -65,19 +63,12 @@ impl Layout {
         let mut layout = Layout::default();
         let wide = [input.prior.pose_length, input.prior.pose_angle];
         let place = |name: &str, part: Part, known: Option<KnownPlace>| -> Vec<Unknown> {
-            let std = match known {
-                None => wide,
-                Some(known) => known.std.unwrap_or([EXACT; 2]),
-            };
-            let held = known.is_some_and(|k| k.std.is_none());
-            let all = Unknown::frame(name, part, std).into_iter();
-            all.map(|u| match known {
-                None => u,
-                Some(_) => Unknown {
-                    scale: KNOWN_SCALE,
-                    held,
-                    ..u
-                },
+            let std = known.and_then(|k| k.std);
+            let all = Unknown::frame(name, part, std.unwrap_or(wide)).into_iter();
+            all.map(|u| Unknown {
+                scale: std.map_or(u.scale, |_| SCALE),
+                held: known.is_some() && std.is_none(),
+                ..u
             })
             .collect()
         };
@@ -111,7 +102,7 @@ impl Layout {
                     contact = Some(unknowns.len());
                     for n in ["x", "y", "z"] {
                         unknowns.push(Unknown {
-                            scale: 0.01,
+                            scale: SCALE,
                             ..Unknown::new(
                                 format!("{}.{n}", measured.file),
                                 "m",
@@ -128,27 +119,23 @@ impl Layout {
                         None => [f64::INFINITY; 2],
                     };
                     let frame = Unknown::frame(&measured.file, Part::Grip, [length, angle]);
-                    unknowns.extend(frame.into_iter().map(|u| Unknown { scale: 0.01, ..u }));
+                    unknowns.extend(frame.into_iter().map(|u| Unknown { scale: SCALE, ..u }));
                 }
                 (Kind::Ball, _) => {
                     contact = Some(unknowns.len());
                     for n in ["x", "y", "z", "other_x", "other_y", "other_z"] {
                         let name = format!("{}.{n}", measured.file);
                         unknowns.push(Unknown {
-                            scale: 0.01,
+                            scale: SCALE,
                             ..Unknown::new(name, "m", Part::Grip, f64::INFINITY)
                         });
                     }
                 }
                 (Kind::Plane | Kind::Gauge, _) => {
                     contact = Some(unknowns.len());
-                    for (n, unit, scale) in [
-                        ("tilt1", "rad", 0.01),
-                        ("tilt2", "rad", 0.01),
-                        ("d", "m", 0.01),
-                    ] {
+                    for (n, unit) in [("tilt1", "rad"), ("tilt2", "rad"), ("d", "m")] {
                         unknowns.push(Unknown {
-                            scale,
+                            scale: SCALE,
                             ..Unknown::new(
                                 format!("{}.{n}", measured.file),
                                 unit,

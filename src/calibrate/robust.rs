@@ -60,10 +60,7 @@ pub(super) fn set_up(model: &Model, plan: &Plan, x: &[f64]) -> Result<Vec<f64>> 
     let mut model = model.clone();
     model.settings.orientation = true;
     model.even = true;
-    let x = match only.free.contains(&true) {
-        true => fit::solve(&model, &only, x)?.x,
-        false => x.to_vec(),
-    };
+    let x = fit::solve(&model, &only, x)?.x;
     set_up_rest(&model, plan, &x)
 }
 
