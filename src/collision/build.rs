@@ -104,7 +104,7 @@ fn with_volumes(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
         return Ok(None);
     }
     scene.bodies_unseen(robot);
-    scene.floor(geometry);
+    scene.floor(geometry, robot);
     let joined = Joined::new(geometry);
     let ignored = ignored(geometry, &mut scene.warnings)?;
     scene.pair_up(robot, &joined, &ignored);
@@ -192,8 +192,8 @@ impl Scene {
     }
 
     /// The plane `z = 0` of the base frame, where the file asks for it, or where it says nothing and the base
-    /// stands on it.
-    fn floor(&mut self, geometry: &Geometry) {
+    /// stands on it. The base of one arm that reaches lower stands on its own lowest point.
+    fn floor(&mut self, geometry: &Geometry, robot: &Robot) {
         let lowest = |v: &Volume| {
             let mut corners = [Vector3::zeros(); MOST_VERTICES];
             let k = v.shape.core(&Pose::identity(), &mut corners);
@@ -205,23 +205,37 @@ impl Scene {
         };
         let base = self.volumes.iter().filter(|v| v.body.is_none()).map(lowest);
         let low = base.fold(f64::INFINITY, f64::min);
-        let wanted = geometry.floor.unwrap_or(low > -SUNK);
-        if geometry.floor.is_none() && !wanted {
+        let sunk = low < -SUNK;
+        // the trunk of a walker does not stand on the floor
+        let limbs = robot.bodies.iter().filter(|b| b.parent.is_none()).count();
+        let offset = match (geometry.floor, sunk, limbs) {
+            (Some(false), ..) => None,
+            (Some(true), ..) | (None, false, _) => Some(0.0),
+            (None, true, 1) => Some(low),
+            (None, true, _) => None,
+        };
+        if geometry.floor.is_none() && sunk {
+            let assumed = match offset {
+                Some(at) => {
+                    format!("the floor is assumed there, at z = {at:.3} m, and not at z = 0")
+                }
+                None => "no floor is assumed at z = 0".into(),
+            };
             self.warnings.push(Warning::new(
                 WarningKind::CollisionNotChecked,
                 "floor",
                 format!(
-                    "the base reaches {:.2} m below its own frame, so no floor is assumed at z = 0; \
-                     state `floor = true` in [collision], or the floor as an [[obstacle]]",
+                    "the base reaches {:.3} m below its own frame, so {assumed}; state `floor = true` (a floor at \
+                     z = 0) or `floor = false` in [collision], or the floor as an [[obstacle]]",
                     -low
                 ),
             ));
         }
-        if wanted {
+        if let Some(offset) = offset {
             self.obstacles.push(Obstacle::Plane {
                 name: FLOOR.into(),
                 normal: Vector3::z(),
-                offset: 0.0,
+                offset,
             });
         }
     }

@@ -1,6 +1,6 @@
 //! Designs keep clear of the robot itself and of what stands around it, and reports say how near a motion comes.
 
-use excite::collision::scene::{Scene, poses};
+use excite::collision::scene::{Obstacle, Scene, poses};
 use excite::design::{Design, Settings, design};
 use excite::identifiability::json::json;
 use excite::identifiability::page::{Grade, verdict};
@@ -19,14 +19,20 @@ const BOX: &str = r#"<collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 
 /// Two links of 0.4 m in the vertical x-z plane on a column that stands on the floor; they reach the floor and,
 /// folded, the column.
 fn arm(more: &str) -> Plant {
+    arm_on(0.3, "", more)
+}
+
+/// The same on a column of this height, whose upper end stays where it is, with `limb` beside.
+fn arm_on(height: f64, limb: &str, more: &str) -> Plant {
+    let middle = 0.3 - height / 2.0;
     let urdf = format!(
         r#"<robot name="arm">
-<link name="column"><collision><origin xyz="0 0 0.15"/><geometry><box size="0.2 0.2 0.3"/></geometry></collision></link>
+<link name="column"><collision><origin xyz="0 0 {middle}"/><geometry><box size="0.2 0.2 {height}"/></geometry></collision></link>
 <link name="upper">{INERTIA}{CAPSULE}</link>
 <link name="lower">{INERTIA}{BOX}</link>
 <joint name="shoulder" type="revolute"><parent link="column"/><child link="upper"/><origin xyz="0 0 0.4"/><axis xyz="0 -1 0"/><limit lower="-3" upper="3" velocity="3" effort="60"/></joint>
 <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.4 0 0"/><axis xyz="0 -1 0"/><limit lower="-2.5" upper="2.5" velocity="4" effort="30"/></joint>
-</robot>
+{limb}</robot>
 "#
     );
     let toml = format!(
@@ -156,6 +162,42 @@ fn a_start_posture_in_the_floor_is_refused() {
         }
         other => panic!("{:?}", other.map(|d| d.value)),
     }
+}
+
+/// Where the floor of a robot is, if there is one, and what is said of it.
+fn floor(plant: &Plant) -> (Option<f64>, Vec<String>) {
+    let scene = scene(plant);
+    let at = scene.obstacles.iter().find_map(|o| match o {
+        Obstacle::Plane { name, offset, .. } if name == "floor" => Some(*offset),
+        _ => None,
+    });
+    let about = |w: &&excite::Warning| w.message.contains("floor");
+    let said = scene.warnings.iter().filter(about);
+    (at, said.map(|w| w.message.clone()).collect())
+}
+
+#[test]
+fn the_floor_is_where_the_base_ends() {
+    assert_eq!(floor(&arm("")), (Some(0.0), vec![]));
+    let (at, said) = floor(&arm_on(0.5, "", ""));
+    assert!((at.unwrap() + 0.2).abs() < 1e-12, "{at:?}");
+    assert!(
+        said[0].contains("at z = -0.200 m, and not at z = 0"),
+        "{said:?}"
+    );
+    let (at, said) = floor(&arm_on(0.5, "", "[collision]\nfloor = true\n"));
+    assert_eq!((at, said), (Some(0.0), vec![]));
+    // the trunk of something with two limbs does not stand on its lowest point
+    let limb = format!(
+        r#"<link name="other">{INERTIA}</link>
+<joint name="hip" type="revolute"><parent link="column"/><child link="other"/><axis xyz="0 -1 0"/><limit lower="-1" upper="1" velocity="1" effort="60"/></joint>
+"#
+    );
+    let more =
+        "[[joint]]\nname = \"hip\"\nacceleration = 15.0\njerk = 1500.0\ntorque_noise = 0.2\n";
+    let (at, said) = floor(&arm_on(0.5, &limb, more));
+    assert_eq!(at, None);
+    assert!(said[0].contains("no floor is assumed"), "{said:?}");
 }
 
 /// End of the arm.

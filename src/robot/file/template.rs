@@ -236,7 +236,7 @@ fn surroundings(robot: &Robot, out: &mut String) {
         ),
         None => writeln!(
             out,
-            "# floor = true     # the plane z = 0 of the base frame; true where the base stands on it"
+            "# floor = true     # the plane z = 0 of the base frame; left out, where the base ends"
         ),
     };
     let margin = geometry.margin.unwrap_or(crate::robot::geometry::MARGIN);
