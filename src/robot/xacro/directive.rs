@@ -1,6 +1,7 @@
 //! Elements of xacro.
 
 use super::scope::Entry;
+use super::token::{Token, tokens};
 use super::tree::{self, Element, Node};
 use super::value::Value;
 use super::{Work, Wrong};
@@ -150,10 +151,16 @@ fn mentions(text: &str, name: &str) -> bool {
         .split("${")
         .skip(1)
         .filter_map(|part| part.split('}').next());
-    let letter = |c: char| c.is_alphanumeric() || c == '_';
-    inside
-        .flat_map(|part| part.split(|c: char| !letter(c)))
-        .any(|word| word == name)
+    let mut all = inside.map(|part| tokens(part).unwrap_or_default());
+    all.any(|all| {
+        all.iter().enumerate().any(|(k, token)| {
+            let behind = k.checked_sub(1).and_then(|k| all.get(k));
+            // text, attributes and names of values are none
+            matches!(token, Token::Name(word) if word == name)
+                && behind != Some(&Token::Sign("."))
+                && all.get(k + 1) != Some(&Token::Sign("="))
+        })
+    })
 }
 
 /// An attribute that must be there.

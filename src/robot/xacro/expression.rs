@@ -202,6 +202,9 @@ impl Parser {
                     _ => return Err("a name is missing behind `.`".into()),
                 }
                 self.at += 1;
+            } else if matches!(&out, Node::Name(n) if n == "dict") && self.named() {
+                self.at += 1;
+                out = self.dict()?;
             } else if self.sign("(") {
                 out = Node::Call(out.into(), self.list(")")?);
             } else if self.sign("[") {
@@ -224,6 +227,32 @@ impl Parser {
                 return Ok(out);
             }
         }
+    }
+
+    /// Whether values by name follow in brackets.
+    fn named(&self) -> bool {
+        matches!(
+            self.tokens.get(self.at..self.at + 3),
+            Some([Token::Sign("("), Token::Name(_), Token::Sign("=")])
+        )
+    }
+
+    /// `a=1, b=2)` of a dictionary.
+    fn dict(&mut self) -> Parsed {
+        let mut all = Vec::new();
+        while !self.sign(")") {
+            let Some(Token::Name(key)) = self.peek().cloned() else {
+                return Err("`dict` takes values by name, as in dict(a=1, b=2)".into());
+            };
+            self.at += 1;
+            self.expect("=")?;
+            all.push((Node::Value(key.as_str().into()), self.any()?));
+            if !self.sign(",") {
+                self.expect(")")?;
+                break;
+            }
+        }
+        Ok(Node::Dict(all))
     }
 
     /// Values up to a sign.

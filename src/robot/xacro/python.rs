@@ -219,6 +219,7 @@ pub(super) fn call(name: &str, args: &[Value]) -> Made {
             )));
         }
         ("list" | "tuple", []) => return Ok(Value::List(Rc::default())),
+        ("dict", [v @ Value::Dict(_)]) => return Ok(v.clone()),
         ("dict", []) => return Ok(Value::Dict(Rc::default())),
         ("float", [Value::Text(t)]) => {
             let x = number(t.trim()).ok_or_else(|| format!("`{t}` is not a number"))?;

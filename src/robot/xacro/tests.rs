@@ -57,6 +57,8 @@ fn expressions_are_those_of_python() {
         ("str(1) + 'x'", "1x"),
         ("math.sqrt(16)", "4.0"),
         ("None == 0 or 3", "3"),
+        ("dict(a=1.5, b='x')['b'] + str(dict(a=1.5).a)", "x1.5"),
+        ("len(dict(dict(a=1)))", "1"),
     ] {
         assert_eq!(value(text), wanted, "{text}");
     }
@@ -93,6 +95,13 @@ fn properties_macros_and_conditions() {
         ),
         "<y/>"
     );
+    // a name in text or behind a point is not the property that is stated anew
+    let text = "<xacro:property name=\"m\" value=\"1\"/><xacro:property name=\"c\" value=\"${dict(m=4)}\"/>\
+                <xacro:property name=\"m\" value=\"${c.m if 'm' in 'mn' else 0}\"/><x a=\"${m}\"/>";
+    assert_eq!(body(text), "<x a=\"4\"/>");
+    // a dictionary as the default of a parameter
+    let text = "<xacro:macro name=\"m\" params=\"at:=${dict(turn=0.5,lift=-1)}\"><x a=\"${at['turn'] + at.lift}\"/></xacro:macro><xacro:m/>";
+    assert_eq!(body(text), "<x a=\"-0.5\"/>");
     // arguments may stand below the line that needs them
     assert_eq!(
         body("<x a=\"$(arg n)\"/><xacro:arg name=\"n\" default=\"5\"/>"),
@@ -223,4 +232,17 @@ fn a_description_of_several_files_is_a_robot() {
         .unwrap_err()
         .to_string();
     assert!(said.contains("did you mean `name`"), "{said}");
+}
+
+#[test]
+fn a_key_that_stands_twice_has_its_last_value() {
+    let text = "link:\n  mass: 1\n  inertia:\n  inertia: {xx: 0.5}\nshared: &all {mass: 2, length: 3}\nother:\n  <<: *all\n  mass: 7\n";
+    let read = yaml::read(text).unwrap();
+    let at = |path: [&str; 2]| {
+        let one = read.get(&path[0].into()).unwrap();
+        one.get(&path[1].into()).unwrap().to_string()
+    };
+    assert_eq!(at(["link", "inertia"]), "{'xx': 0.5}");
+    assert_eq!(at(["other", "mass"]), "7");
+    assert_eq!(at(["other", "length"]), "3");
 }

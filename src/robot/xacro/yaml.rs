@@ -52,14 +52,7 @@ impl MarkedEventReceiver for Reader {
                 if let Some((all, map, anchor)) = self.open.pop() {
                     let value = match map {
                         false => Value::List(Rc::new(all)),
-                        true => {
-                            let mut pairs: Vec<(Value, Value)> = Vec::new();
-                            let mut rest = all.into_iter();
-                            while let (Some(k), Some(v)) = (rest.next(), rest.next()) {
-                                pairs.push((k, v));
-                            }
-                            Value::Dict(Rc::new(pairs))
-                        }
+                        true => mapping(all),
                     };
                     self.put(value, anchor);
                 }
@@ -89,6 +82,38 @@ impl Reader {
             }
         }
     }
+}
+
+/// Keys and values in turn, as Python reads them: of a key that stands there twice the last value counts, and what is
+/// merged in with `<<` gives way to what is stated.
+fn mapping(all: Vec<Value>) -> Value {
+    let mut pairs: Vec<(Value, Value)> = Vec::new();
+    let mut merged: Vec<(Value, Value)> = Vec::new();
+    let mut rest = all.into_iter();
+    while let (Some(k), Some(v)) = (rest.next(), rest.next()) {
+        match (&k, v) {
+            (Value::Text(t), Value::Dict(others)) if &**t == "<<" => {
+                merged.extend(others.iter().cloned());
+            }
+            (Value::Text(t), Value::List(all)) if &**t == "<<" => {
+                for one in all.iter() {
+                    if let Value::Dict(others) = one {
+                        merged.extend(others.iter().cloned());
+                    }
+                }
+            }
+            (_, v) => match pairs.iter_mut().find(|(known, _)| *known == k) {
+                Some((_, value)) => *value = v,
+                None => pairs.push((k, v)),
+            },
+        }
+    }
+    for (k, v) in merged {
+        if !pairs.iter().any(|(known, _)| *known == k) {
+            pairs.push((k, v));
+        }
+    }
+    Value::Dict(Rc::new(pairs))
 }
 
 /// A scalar without quotes.
