@@ -17,6 +17,7 @@ mod families;
 mod frame;
 pub mod json;
 mod kinematics;
+mod own;
 pub mod page;
 mod search;
 mod stated;

@@ -166,19 +166,23 @@ fn margin(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> [f64; 2] {
     [sum, error]
 }
 
-/// Confidence of a sign that only its being usual speaks for.
+/// Confidence of a sign that only its being usual speaks for: fewer columns of the joint are turned with it.
 pub(super) const LIKELY_SIGN: f64 = 0.6;
+/// … and of one for which not even that speaks.
+const EITHER_SIGN: f64 = 0.5;
 
 /// Which way a joint's column of positions counts.
 pub(super) struct Orientation {
-    /// whether joint and sign are told
+    /// whether the joint is told
     pub known: bool,
+    /// whether the torques tell the sign
+    pub told: bool,
     pub sign: f64,
     pub confidence: f64,
 }
 
 /// The sign of each joint: by the model, or, where turning the positions and the torques together changes nothing that is
-/// seen, the usual one: none of them turned, if they agree with one another.
+/// seen, the one with which fewer of its columns are turned.
 pub(super) fn orientation(
     best: &Hypothesis,
     verdict: &Verdict,
@@ -186,32 +190,43 @@ pub(super) fn orientation(
     claims: &[Claim],
     positions: &[usize],
     torques: &[usize],
+    allowed: &dyn Fn(usize, f64) -> bool,
 ) -> Vec<Orientation> {
     (0..best.column.len())
         .map(|j| {
             if verdict.sure(j) {
                 return Orientation {
                     known: true,
+                    told: true,
                     sign: best.sign[j],
                     confidence: 0.95,
                 };
             }
             let p = positions[best.column[j]];
-            let rates = claims
-                .iter()
-                .filter(|c| c.of == Some(p))
-                .all(|c| c.sign > 0.0);
+            let rates = claims.iter().filter(|c| c.of == Some(p)).map(|c| c.sign);
             let mine = (0..torques.len()).filter(|&c| {
                 let share = matches[j][c].share;
                 share > SHARE && share >= matches.iter().map(|r| r[c].share).fold(0.0, f64::max)
             });
             // with positions as they are, the gains that belong to them
-            let mut gains = mine.map(|c| matches[j][c].gain * best.sign[j]).peekable();
-            let agree = gains.peek().is_some() && gains.all(|g| g > 0.0);
+            let gains = mine.map(|c| (matches[j][c].gain * best.sign[j]).signum());
+            let signs: Vec<f64> = rates.chain(gains).chain([1.0]).collect();
+            let sum: f64 = signs.iter().sum();
+            let only = [1.0, -1.0].into_iter().filter(|&s| allowed(j, s));
+            let only: Vec<f64> = only.collect();
+            let (told, sign) = match only[..] {
+                [one] => (true, one),
+                _ => (false, if sum < 0.0 { -1.0 } else { 1.0 }),
+            };
             Orientation {
-                known: verdict.joint[j] && rates && agree,
-                sign: 1.0,
-                confidence: LIKELY_SIGN,
+                known: verdict.joint[j],
+                told,
+                sign,
+                confidence: match (told, sum.abs() < 0.5) {
+                    (true, _) => 0.9,
+                    (false, false) => LIKELY_SIGN,
+                    (false, true) => EITHER_SIGN,
+                },
             }
         })
         .collect()
