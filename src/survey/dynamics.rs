@@ -2,6 +2,7 @@
 
 use super::claim::{Claim, Means};
 use super::contradict::contradict;
+use super::delay::{at_times, delays};
 use super::families::{blocks, families};
 use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
@@ -87,7 +88,8 @@ fn look(
         .iter()
         .map(|&p| scale(frames, &claims[p], p))
         .collect();
-    let Some(signals) = signals(frame, &smooth, &positions, &scales, &torques) else {
+    let Some((mut signals, samples)) = signals(frame, &smooth, &positions, &scales, &torques)
+    else {
         return;
     };
     let problem = Problem::new(plant, &signals);
@@ -152,6 +154,15 @@ fn look(
         followers(claims, &positions);
         return;
     }
+    // torques that come later than the positions
+    let late: Vec<f64> = match stated_all {
+        true => vec![0.0; torques.len()],
+        false => delays(&problem, best, &smooth, &torques, &samples),
+    };
+    let shifted = torques.iter().zip(&late);
+    let shifted = shifted.map(|(&k, d)| at_times(&smooth.value[k], &samples, d / smooth.step));
+    signals.y = shifted.collect();
+    let problem = Problem::new(plant, &signals);
     // an order that no joint is too fast for speaks against those that one is
     let fastest: Vec<f64> = signals
         .qd
@@ -214,7 +225,7 @@ fn look(
     }
     followers(claims, &positions);
     families(
-        &smooth, claims, &matches, &torques, plant, best, &usual, &verdict,
+        &smooth, claims, &matches, &torques, plant, best, &usual, &verdict, &late,
     );
     blocks(claims, plant);
 }
@@ -293,7 +304,7 @@ fn signals(
     positions: &[usize],
     scales: &[f64],
     torques: &[usize],
-) -> Option<Signals> {
+) -> Option<(Signals, Vec<usize>)> {
     let len = positions.iter().map(|&p| smooth.value[p].len()).max()?;
     let get = |k: usize, of: &[Vec<f64>]| match of[k].is_empty() {
         true => vec![0.0; len],
@@ -319,7 +330,7 @@ fn signals(
         .collect();
     let pick = |y: &[f64], s: f64| at.iter().map(|&i| y[i] * s).collect::<Vec<f64>>();
     let scaled = |list: &[Vec<f64>]| list.iter().zip(scales).map(|(y, s)| pick(y, *s)).collect();
-    Some(Signals {
+    let signals = Signals {
         q: positions
             .iter()
             .zip(scales)
@@ -335,7 +346,8 @@ fn signals(
             .iter()
             .map(|&k| pick(&smooth.value[k], 1.0))
             .collect(),
-    })
+    };
+    Some((signals, at))
 }
 
 /// What derives from positions takes their joint, sign and unit.

@@ -12,6 +12,10 @@ const AHEAD: f64 = 0.6;
 /// Least share of what friction leaves that the bodies explain, for a gain to be told.
 const RIGID: f64 = 0.4;
 
+/// Factor within which a nominal model is right about a torque.
+const SAME: std::ops::Range<f64> = 0.6..1.67;
+/// Share explained of a column by another of the same joint's torque in the same unit.
+const TWIN: f64 = 0.9;
 /// Largest torque of a joint in a record, as a share of its limit: anything within a factor of less than a thousand.
 const USED: std::ops::Range<f64> = 0.004..1.5;
 /// Factor within which the gains of all drives are for one of them to be taken from the others.
@@ -28,6 +32,7 @@ pub(super) fn families(
     best: &Hypothesis,
     usual: &[Orientation],
     verdict: &Verdict,
+    late: &[f64],
 ) {
     let n = best.column.len();
     let joints = plant.actuators();
@@ -66,6 +71,7 @@ pub(super) fn families(
     for j in 0..n {
         let mut mine: Vec<usize> = (0..torques.len()).filter(|&c| of[c] == Some(j)).collect();
         mine.sort_by(|a, b| grain(b).total_cmp(&grain(a)));
+        let mut unit = None;
         for (rank, &c) in mine.iter().enumerate() {
             let k = torques[c];
             let (m, sign) = (&matches[j][c], matches[j][c].gain.signum());
@@ -79,7 +85,11 @@ pub(super) fn families(
             let largest = |m: f64, x: &f64| m.max(x.abs());
             let gain = match gains[c] {
                 Some(g) => Some((g, 0.9)),
-                None if made => None,
+                // one that is as large as the measured one is in its unit
+                None if made => smooth
+                    .follows(&smooth.value[torques[mine[0]]], &smooth.value[k])
+                    .filter(|f| f.share > TWIN && SAME.contains(&f.slope.abs()))
+                    .and(unit),
                 None => {
                     let most = smooth.value[k].iter().fold(0.0, largest);
                     Gain::of_others(&measured, most, joints[j].limits.effort)
@@ -91,6 +101,9 @@ pub(super) fn families(
                 );
                 continue;
             };
+            if rank == 0 {
+                unit = Some((gain, confidence));
+            }
             claims[k].means = match gain.torque {
                 _ if made => Means::Command,
                 true => Means::Torque,
@@ -105,6 +118,7 @@ pub(super) fn families(
             }
             claims[k].sign = sign * usual[j].sign * best.sign[j];
             claims[k].sign_known = usual[j].told;
+            claims[k].delay = late[c];
             let confidence = if made { 0.6 } else { confidence };
             claims[k].confidence = usual[j].confidence.min(confidence);
             claims[k].at = Some(j);
@@ -143,7 +157,7 @@ impl Gain {
     fn new(gain: f64) -> Self {
         let size = gain.abs();
         let power = 10f64.powf((size.log10() / 3.0).round() * 3.0);
-        let torque = (0.6..1.67).contains(&(size / power));
+        let torque = SAME.contains(&(size / power));
         Gain {
             torque,
             scale: if torque { 1.0 / power } else { 1.0 / size },

@@ -11,6 +11,7 @@
 mod check;
 mod claim;
 mod contradict;
+mod delay;
 mod dynamics;
 mod experiment;
 mod families;

@@ -74,6 +74,11 @@ impl Own {
 }
 
 impl Along {
+    /// Square of the signal.
+    pub fn square(&self) -> f64 {
+        self.square
+    }
+
     /// Square of what the terms of a kind leave.
     pub fn left(&self, kind: usize) -> f64 {
         self.square - self.shared(self, kind)

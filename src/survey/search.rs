@@ -11,7 +11,7 @@
 //! hypothesis is the sum over columns of `−K/2 ln(1 − R²)` of the joint that explains each best. Swaps of two joints and
 //! turned signs are tried until none is better, from the stated order and from random ones.
 
-use super::own::{Along, KINDS, Own, dot, residual, without};
+use super::own::{Along, KINDS, Own, dot, residual};
 use crate::dynamics::{Samples, Workspace};
 use crate::plant::Plant;
 use rand::seq::SliceRandom;
@@ -21,6 +21,10 @@ use rayon::prelude::*;
 
 /// Highest share that counts, so that no column of a perfect model outweighs all others.
 const MOST: f64 = 0.999;
+
+/// Starts at a time, and how many of them must end in the best order for no more to be tried.
+const BATCH: usize = 24;
+const AGREE: usize = 4;
 
 /// Signals at some samples: `[column][sample]`.
 pub(super) struct Signals {
@@ -80,15 +84,7 @@ impl<'a> Problem<'a> {
             .zip(&signals.qdd)
             .map(|(v, a)| Own::new(v, a, alone))
             .collect();
-        let mean = vec![1.0 / (count.max(1) as f64).sqrt(); count];
-        let total = signals
-            .y
-            .iter()
-            .map(|y| {
-                let r = without(y, &[&mean]);
-                dot(&r, &r)
-            })
-            .collect();
+        let total = signals.y.iter().map(|y| spread(y)).collect();
         let along = own
             .iter()
             .map(|o| signals.y.iter().map(|y| o.along(y)).collect())
@@ -147,60 +143,32 @@ impl<'a> Problem<'a> {
                     .map(|(a, b)| a - b)
                     .collect();
                 let own = &self.own[h.column[j]];
-                let least = 1e-9 * dot(full, full);
                 let sides = [full, &light[..]].map(|x| (x, own.along(x)));
                 (0..self.signals.y.len())
                     .map(|c| {
-                        let y = &self.along[h.column[j]][c];
-                        let mut best = Match {
-                            side: 2,
-                            kind: KINDS.len() - 1,
-                            ..Match::default()
-                        };
-                        // friction and offset alone
-                        let mut alone = f64::INFINITY;
-                        for kind in 0..KINDS.len() {
-                            let [v, f] = own.friction(kind, y, &Along::default(), 0.0);
-                            let left = y.left(kind).max(0.0);
-                            if v * f >= 0.0 && left < alone {
-                                alone = left;
-                                best.gain = (v + f).signum() * h.sign[j] * f64::MIN_POSITIVE;
-                                best.kind = kind;
-                            }
-                        }
-                        let mut left = alone;
-                        for (k, (side, x)) in sides.iter().enumerate() {
-                            let product = dot(side, &self.signals.y[c]);
-                            for kind in 0..KINDS.len() {
-                                let xx = x.left(kind);
-                                if !(xx > least) {
-                                    continue;
-                                }
-                                let xy = product - x.shared(y, kind);
-                                let gain = xy / xx;
-                                let after = (y.left(kind) - gain * xy).max(0.0);
-                                if after >= left {
-                                    continue;
-                                }
-                                // friction brakes: it has the sign of the gain
-                                let [v, f] = own.friction(kind, y, x, gain);
-                                let with = gain * h.sign[j];
-                                if v * with < 0.0 || f * with < 0.0 {
-                                    continue;
-                                }
-                                left = after;
-                                best.gain = gain;
-                                best.weightless = k == 1;
-                                (best.kind, best.side) = (kind, k);
-                            }
-                        }
-                        best.share = 1.0 - left / self.total[c].max(1e-300);
-                        best.rigid = 1.0 - left / alone.max(1e-300);
-                        best
+                        let along = &self.along[h.column[j]][c];
+                        let y = (&self.signals.y[c][..], along, self.total[c]);
+                        explain(own, h.sign[j], &sides, y)
                     })
                     .collect()
             })
             .collect()
+    }
+
+    /// How its best joint explains a column of torques at each of some other samples of it, `[which]`.
+    pub fn shifted(&self, h: &Hypothesis, j: usize, other: &[Vec<f64>]) -> Vec<Match> {
+        let m = self.count;
+        let [rigid, weight] = self.torques(h, &mut Workspace::default());
+        let full = &rigid[j * m..(j + 1) * m];
+        let pairs = full.iter().zip(&weight[j * m..]);
+        let light: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        let own = &self.own[h.column[j]];
+        let sides = [full, &light[..]].map(|x| (x, own.along(x)));
+        let of = |y: &Vec<f64>| {
+            let y = (&y[..], &own.along(y), spread(y));
+            explain(own, h.sign[j], &sides, y)
+        };
+        other.iter().map(of).collect()
     }
 
     /// Share of each column that its best joint explains.
@@ -340,14 +308,81 @@ impl<'a> Problem<'a> {
                 .for_each(|s| *s = if random.random_bool(0.5) { 1.0 } else { -1.0 });
             starts.push(h);
         }
-        let mut found: Vec<(f64, Hypothesis)> = starts
-            .into_par_iter()
-            .map(|h| self.climb(h, fits))
-            .collect();
+        // until several of them have ended in the best
+        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
+        for batch in starts.chunks(BATCH) {
+            found.par_extend(batch.to_vec().into_par_iter().map(|h| self.climb(h, fits)));
+            let best = found.iter().map(|f| f.0).fold(f64::MIN, f64::max);
+            if found.iter().filter(|f| f.0 > best - 1e-6).count() > AGREE {
+                break;
+            }
+        }
         // what is stated may be beyond a limit; what was found may not
         found.retain(|(_, h)| fits(h) || h == stated);
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found.dedup_by(|a, b| a.1 == b.1);
         found
     }
+}
+
+/// Squares about the mean.
+fn spread(y: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    y.iter().map(|x| (x - mean) * (x - mean)).sum()
+}
+
+/// How a joint explains a column: its own terms and sign, its rigid torque as a whole and without weight, and the column
+/// with its square about the mean.
+fn explain(
+    own: &Own,
+    sign: f64,
+    sides: &[(&[f64], Along); 2],
+    (values, y, total): (&[f64], &Along, f64),
+) -> Match {
+    let mut best = Match {
+        side: 2,
+        kind: KINDS.len() - 1,
+        ..Match::default()
+    };
+    // friction and offset alone
+    let mut alone = f64::INFINITY;
+    for kind in 0..KINDS.len() {
+        let [v, f] = own.friction(kind, y, &Along::default(), 0.0);
+        let left = y.left(kind).max(0.0);
+        if v * f >= 0.0 && left < alone {
+            alone = left;
+            best.gain = (v + f).signum() * sign * f64::MIN_POSITIVE;
+            best.kind = kind;
+        }
+    }
+    let mut left = alone;
+    let least = 1e-9 * sides[0].1.square();
+    for (k, (side, x)) in sides.iter().enumerate() {
+        let product = dot(side, values);
+        for kind in 0..KINDS.len() {
+            let xx = x.left(kind);
+            if !(xx > least) {
+                continue;
+            }
+            let xy = product - x.shared(y, kind);
+            let gain = xy / xx;
+            let after = (y.left(kind) - gain * xy).max(0.0);
+            if after >= left {
+                continue;
+            }
+            // friction brakes: it has the sign of the gain
+            let [v, f] = own.friction(kind, y, x, gain);
+            let with = gain * sign;
+            if v * with < 0.0 || f * with < 0.0 {
+                continue;
+            }
+            left = after;
+            best.gain = gain;
+            best.weightless = k == 1;
+            (best.kind, best.side) = (kind, k);
+        }
+    }
+    best.share = 1.0 - left / total.max(1e-300);
+    best.rigid = 1.0 - left / alone.max(1e-300);
+    best
 }
