@@ -22,6 +22,9 @@ use rayon::prelude::*;
 /// Highest share that counts, so that no column of a perfect model outweighs all others.
 const MOST: f64 = 0.999;
 
+/// What a torque without weight leaves, of what one with weight does, for weight to be missing.
+const WEIGHTLESS: f64 = 0.7;
+
 /// Starts at a time, and how many of them must end in the best order for no more to be tried.
 const BATCH: usize = 24;
 const AGREE: usize = 4;
@@ -356,6 +359,7 @@ fn explain(
         }
     }
     let mut left = alone;
+    let mut bound = alone;
     let least = 1e-9 * sides[0].1.square();
     for (k, (side, x)) in sides.iter().enumerate() {
         let product = dot(side, values);
@@ -367,7 +371,8 @@ fn explain(
             let xy = product - x.shared(y, kind);
             let gain = xy / xx;
             let after = (y.left(kind) - gain * xy).max(0.0);
-            if after >= left {
+            // that weight is missing must show
+            if after >= left || k == 1 && after >= bound {
                 continue;
             }
             // friction brakes: it has the sign of the gain
@@ -381,6 +386,7 @@ fn explain(
             best.weightless = k == 1;
             (best.kind, best.side) = (kind, k);
         }
+        bound = WEIGHTLESS * left;
     }
     best.share = 1.0 - left / total.max(1e-300);
     best.rigid = 1.0 - left / alone.max(1e-300);

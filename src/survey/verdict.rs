@@ -23,6 +23,8 @@ pub(super) struct Verdict {
     pub joint: Vec<bool>,
     /// whether the turned sign does not, either
     pub sign: Vec<bool>,
+    /// standard errors by which the turned sign of this joint alone is worse
+    pub lean: Vec<f64>,
     /// whether all hypotheses that come near give a column of torques to the same joint
     pub torque: Vec<bool>,
 }
@@ -75,10 +77,17 @@ impl Verdict {
         let mut out = Verdict {
             joint: vec![true; n],
             sign: vec![true; n],
+            lean: vec![0.0; n],
             torque: vec![true; of.len()],
         };
         for rival in rivals {
-            if better(problem, best, &rival) {
+            let [gain, error] = margin(problem, best, &rival);
+            let differs = |j: &usize| rival.sign[*j] != best.sign[*j];
+            let turned: Vec<usize> = (0..n).filter(differs).collect();
+            if let ([j], true) = (&turned[..], rival.column == best.column) {
+                out.lean[*j] = gain / error.max(1e-9);
+            }
+            if clear(gain, error) {
                 continue;
             }
             let other = problem.best_joints(&rival, &mut ws);
@@ -99,8 +108,12 @@ impl Verdict {
 }
 
 /// Whether `a` predicts held-out blocks better than `b`, beyond doubt.
-pub(super) fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
+fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
     let [gain, error] = margin(problem, a, b);
+    clear(gain, error)
+}
+
+fn clear(gain: f64, error: f64) -> bool {
     gain > CLEAR && gain > SURE * error
 }
 
@@ -166,10 +179,10 @@ fn margin(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> [f64; 2] {
     [sum, error]
 }
 
-/// Confidence of a sign that only its being usual speaks for: fewer columns of the joint are turned with it.
-pub(super) const LIKELY_SIGN: f64 = 0.6;
-/// … and of one for which not even that speaks.
-const EITHER_SIGN: f64 = 0.5;
+/// One column in as many is turned.
+const TURNED: f64 = 5.0;
+/// Highest confidence of a sign that the torques do not tell beyond doubt.
+const LIKELY_SIGN: f64 = 0.85;
 
 /// Which way a joint's column of positions counts.
 pub(super) struct Orientation {
@@ -214,19 +227,22 @@ pub(super) fn orientation(
             let sum: f64 = signs.iter().sum();
             let only = [1.0, -1.0].into_iter().filter(|&s| allowed(j, s));
             let only: Vec<f64> = only.collect();
-            let (told, sign) = match only[..] {
-                [one] => (true, one),
-                _ => (false, if sum < 0.0 { -1.0 } else { 1.0 }),
+            // what is usual, and what the torques say without being sure
+            let lean = verdict.lean[j].clamp(0.0, 4.0);
+            let odds = sum * (TURNED - 1.0).ln() + best.sign[j] * 0.5 * lean * lean;
+            let (told, sign, confidence) = match only[..] {
+                [one] => (true, one, 0.9),
+                _ => {
+                    let sign = if odds < 0.0 { -1.0 } else { 1.0 };
+                    let likely = 1.0 / (1.0 + (-odds.abs()).exp());
+                    (false, sign, likely.min(LIKELY_SIGN))
+                }
             };
             Orientation {
                 known: verdict.joint[j],
                 told,
                 sign,
-                confidence: match (told, sum.abs() < 0.5) {
-                    (true, _) => 0.9,
-                    (false, false) => LIKELY_SIGN,
-                    (false, true) => EITHER_SIGN,
-                },
+                confidence,
             }
         })
         .collect()

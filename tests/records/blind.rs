@@ -177,17 +177,34 @@ fn errors(claim: &Claim, truth: &Column, factor: f64, joints: &[String]) -> Vec<
     out
 }
 
+/// The weight that the nominal model has in each row, of each joint.
+fn weights(columns: &[Column], plant: &Plant) -> Vec<Vec<f64>> {
+    let (n, count) = (plant.actuators().len(), columns[0].values.len());
+    let mut motion = Samples::zeros(n, count);
+    for c in columns.iter().filter(|c| c.means == Means::Position) {
+        motion.q[c.joint * count..(c.joint + 1) * count].copy_from_slice(&c.values);
+    }
+    let all = nominal_torque(plant.robot(), plant.tree(), &motion);
+    all.chunks(count).map(<[f64]>::to_vec).collect()
+}
+
 /// Shuffles, renames, scales, turns and delays columns, and tallies what is claimed of them.
 fn scramble(
     columns: &[Column],
     plant: &Plant,
     r: &mut ChaCha8Rng,
     folder: &Path,
+    known: bool,
     table: &mut Table,
 ) {
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
     let degrees = r.random_bool(0.3) && joints.len() > 1;
+    let weight = match r.random_bool(0.2) {
+        true => weights(columns, plant),
+        false => Vec::new(),
+    };
     let mut made: Vec<(usize, f64, Vec<f64>)> = Vec::new();
+    let mut delayed = Vec::new();
     for (k, c) in columns.iter().enumerate() {
         let motion = matches!(c.means, Means::Position | Means::Velocity);
         let mut factor = match c.means {
@@ -204,10 +221,17 @@ fn scramble(
             0
         };
         let n = c.values.len();
-        let values = (0..n)
-            .map(|i| factor * c.values[i.saturating_sub(late)])
+        let off = match c.means {
+            Means::Torque => weight.get(c.joint),
+            _ => None,
+        };
+        let off = |i: usize| off.map_or(0.0, |w| w[i] / c.unit);
+        let values: Vec<f64> = (0..n)
+            .map(|i| i.saturating_sub(late))
+            .map(|i| factor * (c.values[i] - off(i)))
             .collect();
         made.push((k, factor, values));
+        delayed.push(late);
     }
     made.shuffle(r);
     let mut text = String::new();
@@ -244,12 +268,29 @@ fn scramble(
             .or_default();
         row.all += 1;
         let none = claim.means == Means::Other || claim.confidence < 0.5;
-        let errors = errors(
+        let mut errors = errors(
             claim,
             truth,
             if against { -factor } else { *factor },
             &joints,
         );
+        // what was taken off is said where it is most of the column
+        if let Some(w) = weight.get(truth.joint).filter(|_| truth.means == Means::Torque) {
+            let material = spread(w) > 0.2 * spread(&truth.values);
+            if material && claim.without.is_empty() {
+                errors.push("weight");
+            }
+        } else if !claim.without.is_empty() {
+            errors.push("weight");
+        }
+        // of a simulated robot the delay is known, too
+        if known && truth.means == Means::Torque {
+            let step = columns[0].values[1] - columns[0].values[0];
+            let error = claim.delay - delayed[*k] as f64 * step;
+            if error.abs() > 1.5 * step {
+                errors.push("delay");
+            }
+        }
         if none {
             let last = claim.evidence.rsplit(';').next().unwrap_or_default();
             let what = last.replace(|c: char| c.is_ascii_digit(), "");
@@ -271,6 +312,12 @@ fn scramble(
     }
 }
 
+/// Squares about the mean.
+fn spread(y: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    y.iter().map(|x| (x - mean) * (x - mean)).sum()
+}
+
 fn times() -> usize {
     std::env::var("EXCITE_BLIND")
         .ok()
@@ -287,12 +334,13 @@ fn seed() -> u64 {
 }
 
 /// Sums over scrambles of one set: right, right but for a sign that nothing tells, wrong, all.
-fn blind(name: &str, columns: &[Column], plant: &Plant, seed: u64) -> [usize; 4] {
+fn blind(name: &str, columns: &[Column], plant: &Plant, seed: u64, known: bool) -> [usize; 4] {
     let dir = tempfile::tempdir().unwrap();
     let r = &mut rng(seed);
     let mut table = Table::new();
+    let begin = std::time::Instant::now();
     for _ in 0..times() {
-        scramble(columns, plant, r, dir.path(), &mut table);
+        scramble(columns, plant, r, dir.path(), known, &mut table);
     }
     let sum = |f: &dyn Fn(&Tally) -> usize| table.values().map(f).sum::<usize>();
     let sums = [
@@ -302,8 +350,8 @@ fn blind(name: &str, columns: &[Column], plant: &Plant, seed: u64) -> [usize; 4]
         sum(&|t| t.all),
     ];
     eprintln!(
-        "{name}: {} of {} columns exactly right, {} more but for a sign that nothing tells, {} claims wrong",
-        sums[0], sums[3], sums[1], sums[2]
+        "{name}: {} of {} columns exactly right, {} more but for a sign that nothing tells, {} claims wrong; {:.1} s a log",
+        sums[0], sums[3], sums[1], sums[2], begin.elapsed().as_secs_f64() / times() as f64
     );
     for ((kind, joint), t) in table.iter().filter(|(_, t)| t.right < t.all) {
         eprintln!(
@@ -322,7 +370,7 @@ fn blind_columns_of_simulated_robots() {
     for robot in ["planar2", "ur5e", "panda"] {
         let plant = Plant::load(robot).unwrap();
         let [right, _turned, wrong, all] =
-            blind(robot, &simulated(&plant, 3 + seed()), &plant, 11 + seed());
+            blind(robot, &simulated(&plant, 3 + seed()), &plant, 11 + seed(), true);
         // a claim that is wrong in a sign alone is one that only its being usual spoke for
         assert!(20 * wrong <= all, "{robot}: {wrong} of {all}");
         assert!(2 * right > all, "{robot}: {right} of {all}");
@@ -350,7 +398,7 @@ fn blind_columns_of_real_robots() {
             "ur10e_raw" => unnamed(&path),
             _ => named(&path),
         };
-        let [_, _, wrong, all] = blind(name, &columns, &plant, 5 + seed());
+        let [_, _, wrong, all] = blind(name, &columns, &plant, 5 + seed(), false);
         assert!(20 * wrong <= all, "{name}: {wrong} of {all}");
     }
 }
