@@ -183,15 +183,7 @@ fn look(
     }
     let mut ws = Workspace::default();
     let matches = problem.matches(best, &mut ws);
-    let usual = orientation(
-        best,
-        &verdict,
-        &matches,
-        claims,
-        &positions,
-        &torques,
-        &|j, sign| within(j, best.column[j], sign),
-    );
+    let usual = orientation(best, &verdict, &matches, claims, &positions, &torques);
     for j in 0..n {
         let k = positions[best.column[j]];
         if !verdict.joint[j] || !usual[j].known || !explained(&matches, j, &torques) {
@@ -212,16 +204,13 @@ fn look(
         }
         claims[k].confidence = usual[j].confidence;
         claims[k].sign_known = usual[j].told;
-        claims[k].evidence.push_str(match (usual[j].told, verdict.sign[j]) {
-            (true, true) => "; the joint and the sign with which the model explains the torques",
-            (true, false) => {
-                "; the joint with which the model explains the torques, the sign within its limits"
-            }
-            (false, _) => {
-                "; the joint with which the model explains the torques; its sign, and those of all columns of this joint \
-                 with it, the torques do not tell"
-            }
-        });
+        claims[k].evidence.push_str(match usual[j].told {
+                true => "; the joint and the sign with which the model explains the torques",
+                false => {
+                    "; the joint with which the model explains the torques; its sign, and those of all columns of this joint \
+                     with it, the torques do not tell"
+                }
+            });
     }
     followers(claims, &positions);
     families(

@@ -23,8 +23,8 @@ pub(super) struct Verdict {
     pub joint: Vec<bool>,
     /// whether the turned sign does not, either
     pub sign: Vec<bool>,
-    /// standard errors by which the turned sign of this joint alone is worse
-    pub lean: Vec<f64>,
+    /// signs of all joints that come near, with what speaks against them, nats
+    near: Vec<(Vec<f64>, f64)>,
     /// whether all hypotheses that come near give a column of torques to the same joint
     pub torque: Vec<bool>,
 }
@@ -77,18 +77,17 @@ impl Verdict {
         let mut out = Verdict {
             joint: vec![true; n],
             sign: vec![true; n],
-            lean: vec![0.0; n],
+            near: vec![(best.sign.clone(), 0.0)],
             torque: vec![true; of.len()],
         };
         for rival in rivals {
             let [gain, error] = margin(problem, best, &rival);
-            let differs = |j: &usize| rival.sign[*j] != best.sign[*j];
-            let turned: Vec<usize> = (0..n).filter(differs).collect();
-            if let ([j], true) = (&turned[..], rival.column == best.column) {
-                out.lean[*j] = gain / error.max(1e-9);
-            }
             if clear(gain, error) {
                 continue;
+            }
+            if rival.column == best.column {
+                let behind = (gain / error.max(1e-9)).clamp(0.0, 4.0);
+                out.near.push((rival.sign.clone(), 0.5 * behind * behind));
             }
             let other = problem.best_joints(&rival, &mut ws);
             for (c, same) in out.torque.iter_mut().enumerate() {
@@ -107,12 +106,7 @@ impl Verdict {
     }
 }
 
-/// Whether `a` predicts held-out blocks better than `b`, beyond doubt.
-fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
-    let [gain, error] = margin(problem, a, b);
-    clear(gain, error)
-}
-
+/// Whether a gain on held-out blocks is beyond doubt.
 fn clear(gain: f64, error: f64) -> bool {
     gain > CLEAR && gain > SURE * error
 }
@@ -195,7 +189,8 @@ pub(super) struct Orientation {
 }
 
 /// The sign of each joint: by the model, or, where turning the positions and the torques together changes nothing that is
-/// seen, the one with which fewer of its columns are turned.
+/// seen, the one with which fewer columns are turned. Joints that only turn together, as those of an arm and its mirror
+/// image, are turned together.
 pub(super) fn orientation(
     best: &Hypothesis,
     verdict: &Verdict,
@@ -203,46 +198,49 @@ pub(super) fn orientation(
     claims: &[Claim],
     positions: &[usize],
     torques: &[usize],
-    allowed: &dyn Fn(usize, f64) -> bool,
 ) -> Vec<Orientation> {
-    (0..best.column.len())
+    let n = best.column.len();
+    // how many more columns of a joint are as they stand than turned, with its position as it stands
+    let usual: Vec<f64> = (0..n)
         .map(|j| {
-            if verdict.sure(j) {
-                return Orientation {
-                    known: true,
-                    told: true,
-                    sign: best.sign[j],
-                    confidence: 0.95,
-                };
-            }
             let p = positions[best.column[j]];
             let rates = claims.iter().filter(|c| c.of == Some(p)).map(|c| c.sign);
             let mine = (0..torques.len()).filter(|&c| {
                 let share = matches[j][c].share;
                 share > SHARE && share >= matches.iter().map(|r| r[c].share).fold(0.0, f64::max)
             });
-            // with positions as they are, the gains that belong to them
             let gains = mine.map(|c| (matches[j][c].gain * best.sign[j]).signum());
-            let signs: Vec<f64> = rates.chain(gains).chain([1.0]).collect();
-            let sum: f64 = signs.iter().sum();
-            let only = [1.0, -1.0].into_iter().filter(|&s| allowed(j, s));
-            let only: Vec<f64> = only.collect();
-            // what is usual, and what the torques say without being sure
-            let lean = verdict.lean[j].clamp(0.0, 4.0);
-            let odds = sum * (TURNED - 1.0).ln() + best.sign[j] * 0.5 * lean * lean;
-            let (told, sign, confidence) = match only[..] {
-                [one] => (true, one, 0.9),
-                _ => {
-                    let sign = if odds < 0.0 { -1.0 } else { 1.0 };
-                    let likely = 1.0 / (1.0 + (-odds.abs()).exp());
-                    (false, sign, likely.min(LIKELY_SIGN))
-                }
-            };
+            rates.chain(gains).sum::<f64>() + 1.0
+        })
+        .collect();
+    let odds: Vec<f64> = verdict
+        .near
+        .iter()
+        .map(|(signs, behind)| {
+            let turned: f64 = signs.iter().zip(&usual).map(|(s, u)| s * u).sum();
+            0.5 * turned * (TURNED - 1.0).ln() - behind
+        })
+        .collect();
+    let most = odds.iter().copied().fold(f64::MIN, f64::max);
+    let chosen = odds.iter().position(|o| *o >= most).unwrap_or(0);
+    let chosen = &verdict.near[chosen].0;
+    (0..n)
+        .map(|j| {
+            let (mut same, mut all) = (0.0, 0.0);
+            for ((signs, _), o) in verdict.near.iter().zip(&odds) {
+                let weight = (o - most).exp();
+                all += weight;
+                same += if signs[j] == chosen[j] { weight } else { 0.0 };
+            }
+            let told = verdict.sign[j];
             Orientation {
                 known: verdict.joint[j],
                 told,
-                sign,
-                confidence,
+                sign: chosen[j],
+                confidence: match told {
+                    true => 0.95,
+                    false => (same / all).clamp(0.5, LIKELY_SIGN),
+                },
             }
         })
         .collect()

@@ -275,7 +275,10 @@ fn scramble(
             &joints,
         );
         // what was taken off is said where it is most of the column
-        if let Some(w) = weight.get(truth.joint).filter(|_| truth.means == Means::Torque) {
+        if let Some(w) = weight
+            .get(truth.joint)
+            .filter(|_| truth.means == Means::Torque)
+        {
             let material = spread(w) > 0.2 * spread(&truth.values);
             if material && claim.without.is_empty() {
                 errors.push("weight");
@@ -351,7 +354,11 @@ fn blind(name: &str, columns: &[Column], plant: &Plant, seed: u64, known: bool) 
     ];
     eprintln!(
         "{name}: {} of {} columns exactly right, {} more but for a sign that nothing tells, {} claims wrong; {:.1} s a log",
-        sums[0], sums[3], sums[1], sums[2], begin.elapsed().as_secs_f64() / times() as f64
+        sums[0],
+        sums[3],
+        sums[1],
+        sums[2],
+        begin.elapsed().as_secs_f64() / times() as f64
     );
     for ((kind, joint), t) in table.iter().filter(|(_, t)| t.right < t.all) {
         eprintln!(
@@ -369,8 +376,13 @@ fn blind(name: &str, columns: &[Column], plant: &Plant, seed: u64, known: bool) 
 fn blind_columns_of_simulated_robots() {
     for robot in ["planar2", "ur5e", "panda"] {
         let plant = Plant::load(robot).unwrap();
-        let [right, _turned, wrong, all] =
-            blind(robot, &simulated(&plant, 3 + seed()), &plant, 11 + seed(), true);
+        let [right, _turned, wrong, all] = blind(
+            robot,
+            &simulated(&plant, 7301 + seed()),
+            &plant,
+            7411 + seed(),
+            true,
+        );
         // a claim that is wrong in a sign alone is one that only its being usual spoke for
         assert!(20 * wrong <= all, "{robot}: {wrong} of {all}");
         assert!(2 * right > all, "{robot}: {right} of {all}");
@@ -398,7 +410,7 @@ fn blind_columns_of_real_robots() {
             "ur10e_raw" => unnamed(&path),
             _ => named(&path),
         };
-        let [_, _, wrong, all] = blind(name, &columns, &plant, 5 + seed(), false);
+        let [_, _, wrong, all] = blind(name, &columns, &plant, 7505 + seed(), false);
         assert!(20 * wrong <= all, "{name}: {wrong} of {all}");
     }
 }
