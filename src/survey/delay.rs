@@ -4,10 +4,10 @@ use super::kinematics::Smooth;
 use super::search::{Hypothesis, Problem};
 use crate::dynamics::Workspace;
 
-/// Delays that are tried, s.
-const FROM: f64 = -0.012;
+/// Delays that are tried, s: a torque comes no earlier than the positions.
+const FROM: f64 = -0.004;
 const STEP: f64 = 0.004;
-const COUNT: usize = 20;
+const COUNT: usize = 18;
 /// Least share that a joint explains of a column whose delay is looked for, and that the bodies explain of the rest.
 const SHARE: f64 = 0.8;
 const RIGID: f64 = 0.4;

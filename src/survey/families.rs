@@ -196,6 +196,14 @@ impl Gain {
     }
 }
 
+/// What a column is, without telling torques, currents and their commands apart.
+fn kind(c: &Claim) -> Means {
+    match (c.means, c.commands) {
+        (Means::Current, _) | (Means::Command, Some("torque")) => Means::Torque,
+        (other, _) => other,
+    }
+}
+
 /// Runs of as many columns as there are joints, most of which mean the same of the joints in their order: the others of
 /// the run mean it, too. A shuffled table has no such runs.
 pub(super) fn blocks(claims: &mut [Claim], plant: &Plant) {
@@ -233,11 +241,15 @@ pub(super) fn blocks(claims: &mut [Claim], plant: &Plant) {
         let turned = part
             .iter()
             .any(|c| sure(c) && c.means == means && c.sign < 0.0);
+        // a row of torques may hold some that pass for currents or commands, and nothing else
+        let like = part.iter().find(|c| sure(c) && c.means == means);
+        let row = like.map_or(Means::Other, kind);
         if misplaced
             || 2 * placed <= n
             || 3 * count(means) < n.max(6)
             || 2 * count(means) < placed
             || turned
+            || part.iter().any(|c| c.confidence >= 0.5 && kind(c) != row)
         {
             from += 1;
             continue;

@@ -1,7 +1,9 @@
-//! What columns mean: logs whose columns are shuffled, renamed, scaled, turned and delayed.
+//! What columns mean: logs whose columns are shuffled, renamed, scaled, turned and delayed, and whose torques may lack
+//! gravity.
 //!
 //! `EXCITE_BLIND=50 cargo test --release --test records blind -- --nocapture` makes 50 of each set instead of two, and
-//! prints how many columns were exactly right and how many claims were wrong.
+//! prints how many columns were exactly right and how many claims were wrong, and by kind and joint why the others were
+//! not right. `EXCITE_BLIND_SEED` adds to the seeds: rules are found on other seeds than those they are judged by.
 
 use crate::common::{rng, shared::shared};
 use excite::Plant;
@@ -372,20 +374,29 @@ fn blind(name: &str, columns: &[Column], plant: &Plant, seed: u64, known: bool) 
     sums
 }
 
+/// At most half a per cent of claims are wrong; of the columns, `least` per cent are right but for signs that nothing
+/// tells, and most of those signs are right, too.
+fn bounds(name: &str, [right, turned, wrong, all]: [usize; 4], least: usize) {
+    assert!(200 * wrong <= all, "{name}: {wrong} wrong of {all}");
+    assert!(
+        100 * (right + turned) >= least * all,
+        "{name}: {right} and {turned} of {all}"
+    );
+    assert!(10 * right >= 7 * all, "{name}: {right} of {all}");
+}
+
 #[test]
 fn blind_columns_of_simulated_robots() {
     for robot in ["planar2", "ur5e", "panda"] {
         let plant = Plant::load(robot).unwrap();
-        let [right, _turned, wrong, all] = blind(
+        let sums = blind(
             robot,
-            &simulated(&plant, 7301 + seed()),
+            &simulated(&plant, 9301 + seed()),
             &plant,
-            7411 + seed(),
+            9411 + seed(),
             true,
         );
-        // a claim that is wrong in a sign alone is one that only its being usual spoke for
-        assert!(20 * wrong <= all, "{robot}: {wrong} of {all}");
-        assert!(2 * right > all, "{robot}: {right} of {all}");
+        bounds(robot, sums, 95);
     }
 }
 
@@ -410,7 +421,8 @@ fn blind_columns_of_real_robots() {
             "ur10e_raw" => unnamed(&path),
             _ => named(&path),
         };
-        let [_, _, wrong, all] = blind(name, &columns, &plant, 7505 + seed(), false);
-        assert!(20 * wrong <= all, "{name}: {wrong} of {all}");
+        let sums = blind(name, &columns, &plant, 9505 + seed(), false);
+        // without gravity, joints 5 and 7 of this Panda are not told apart
+        bounds(name, sums, if name == "panda" { 85 } else { 95 });
     }
 }
