@@ -39,6 +39,8 @@ pub struct Claim {
     pub joint: Option<String>,
     /// 1 or -1
     pub sign: f64,
+    /// whether the sign is told; otherwise all columns of the joint may be turned together
+    pub sign_known: bool,
     /// positive factor
     pub scale: f64,
     /// unit that the factor comes from
@@ -67,6 +69,7 @@ impl Claim {
             of: None,
             joint: None,
             sign: 1.0,
+            sign_known: true,
             scale: 1.0,
             unit: None,
             delay: 0.0,

@@ -2,12 +2,13 @@
 
 use super::claim::{Claim, Means};
 use super::contradict::contradict;
+use super::delay::{at_times, delays};
 use super::families::{blocks, families};
 use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
 use super::search::{Hypothesis, Problem, Signals};
 use super::units::{extent, fits};
-use super::verdict::{LIKELY_SIGN, Verdict, explained, orientation};
+use super::verdict::{Verdict, explained, orientation};
 use crate::dynamics::Workspace;
 use crate::error::{Warning, WarningKind};
 use crate::plant::Plant;
@@ -22,6 +23,8 @@ const CUTOFF: f64 = 8.0;
 /// Roughness by which positions and torques differ where neither is named.
 const GAP: f64 = 4.0;
 
+/// Velocity of a joint, of its limit, that it does not reach.
+const FAST: f64 = 1.25;
 /// Random orders that are tried beside that of the columns.
 const STARTS: usize = 120;
 /// Least median share of the columns of torques that the best order explains, for it to be believed.
@@ -85,7 +88,8 @@ fn look(
         .iter()
         .map(|&p| scale(frames, &claims[p], p))
         .collect();
-    let Some(signals) = signals(frame, &smooth, &positions, &scales, &torques) else {
+    let Some((mut signals, samples)) = signals(frame, &smooth, &positions, &scales, &torques)
+    else {
         return;
     };
     let problem = Problem::new(plant, &signals);
@@ -95,12 +99,11 @@ fn look(
         .zip(&scales)
         .map(|(&p, s)| extent(frames, p).map(|x| x * s))
         .collect();
-    let allowed = |h: &Hypothesis| {
-        (0..n).all(|j| {
-            let [a, b] = ranges[h.column[j]].map(|x| x * h.sign[j]);
-            fits(joints[j], a.min(b), a.max(b))
-        })
+    let within = |j: usize, column: usize, sign: f64| {
+        let [a, b] = ranges[column].map(|x| x * sign);
+        fits(joints[j], a.min(b), a.max(b))
     };
+    let allowed = |h: &Hypothesis| (0..n).all(|j| within(j, h.column[j], h.sign[j]));
     // the stated order, or that of the columns
     let stated_all = (0..n).all(|j| positions.iter().any(|&p| claims[p].at == Some(j)));
     let stated = Hypothesis {
@@ -115,7 +118,11 @@ fn look(
             .collect(),
         sign: vec![1.0; n],
     };
-    let found = problem.search(&stated, starts, &allowed);
+    let mut found = problem.search(&stated, starts, &allowed);
+    // an order that nobody stated is within the limits
+    if !stated_all {
+        found.retain(|(_, h)| allowed(h));
+    }
     let Some((_, best)) = found.first() else {
         warnings.push(Warning::new(
             WarningKind::UnitSuspect,
@@ -147,7 +154,26 @@ fn look(
         followers(claims, &positions);
         return;
     }
-    let verdict = Verdict::of(&problem, best, &found, &allowed, n);
+    // torques that come later than the positions
+    let late: Vec<f64> = match stated_all {
+        true => vec![0.0; torques.len()],
+        false => delays(&problem, best, &smooth, &torques, &samples),
+    };
+    let shifted = torques.iter().zip(&late);
+    let shifted = shifted.map(|(&k, d)| at_times(&smooth.value[k], &samples, d / smooth.step));
+    signals.y = shifted.collect();
+    let problem = Problem::new(plant, &signals);
+    // an order that no joint is too fast for speaks against those that one is
+    let fastest: Vec<f64> = signals
+        .qd
+        .iter()
+        .map(|v| v.iter().fold(0.0, |m: f64, x| m.max(x.abs())))
+        .collect();
+    let slow =
+        |h: &Hypothesis| (0..n).all(|j| fastest[h.column[j]] <= FAST * joints[j].limits.velocity);
+    let limited = slow(best);
+    let rival = |h: &Hypothesis| allowed(h) && (!limited || slow(h));
+    let verdict = Verdict::of(&problem, best, &found, &rival, n);
     let trusted = stated_all && claims.iter().any(|c| c.evidence.contains("its name"));
     if trusted {
         contradict(
@@ -166,7 +192,7 @@ fn look(
             claims[k].confidence = 0.3;
             claims[k]
                 .evidence
-                .push_str("; which joint, or its sign, the torques do not tell");
+                .push_str("; which joint the torques do not tell");
             continue;
         }
         claims[k].at = Some(j);
@@ -177,18 +203,18 @@ fn look(
             claims[k].unit = Some("deg");
         }
         claims[k].confidence = usual[j].confidence;
-        claims[k]
-            .evidence
-            .push_str(match usual[j].confidence > LIKELY_SIGN {
+        claims[k].sign_known = usual[j].told;
+        claims[k].evidence.push_str(match usual[j].told {
                 true => "; the joint and the sign with which the model explains the torques",
                 false => {
-                    "; the joint with which the model explains the torques, its sign the usual one"
+                    "; the joint with which the model explains the torques; its sign, and those of all columns of this joint \
+                     with it, the torques do not tell"
                 }
             });
     }
     followers(claims, &positions);
     families(
-        &smooth, claims, &matches, &torques, plant, best, &usual, &verdict,
+        &smooth, claims, &matches, &torques, plant, best, &usual, &verdict, &late,
     );
     blocks(claims, plant);
 }
@@ -267,7 +293,7 @@ fn signals(
     positions: &[usize],
     scales: &[f64],
     torques: &[usize],
-) -> Option<Signals> {
+) -> Option<(Signals, Vec<usize>)> {
     let len = positions.iter().map(|&p| smooth.value[p].len()).max()?;
     let get = |k: usize, of: &[Vec<f64>]| match of[k].is_empty() {
         true => vec![0.0; len],
@@ -293,7 +319,7 @@ fn signals(
         .collect();
     let pick = |y: &[f64], s: f64| at.iter().map(|&i| y[i] * s).collect::<Vec<f64>>();
     let scaled = |list: &[Vec<f64>]| list.iter().zip(scales).map(|(y, s)| pick(y, *s)).collect();
-    Some(Signals {
+    let signals = Signals {
         q: positions
             .iter()
             .zip(scales)
@@ -309,7 +335,8 @@ fn signals(
             .iter()
             .map(|&k| pick(&smooth.value[k], 1.0))
             .collect(),
-    })
+    };
+    Some((signals, at))
 }
 
 /// What derives from positions takes their joint, sign and unit.
@@ -325,6 +352,7 @@ fn followers(claims: &mut [Claim], positions: &[usize]) {
         };
         claims[k].sign *= sign;
         claims[k].scale *= scale;
+        claims[k].sign_known = claims[*p].sign_known;
         claims[k].at = claims[*p].at;
         claims[k].joint = claims[*p].joint.clone();
         claims[k].confidence = claims[k].confidence.min(claims[*p].confidence);

@@ -11,12 +11,14 @@
 mod check;
 mod claim;
 mod contradict;
+mod delay;
 mod dynamics;
 mod experiment;
 mod families;
 mod frame;
 pub mod json;
 mod kinematics;
+mod own;
 pub mod page;
 mod search;
 mod stated;

@@ -11,6 +11,7 @@
 //! hypothesis is the sum over columns of `−K/2 ln(1 − R²)` of the joint that explains each best. Swaps of two joints and
 //! turned signs are tried until none is better, from the stated order and from random ones.
 
+use super::own::{Along, KINDS, Own, dot, residual};
 use crate::dynamics::{Samples, Workspace};
 use crate::plant::Plant;
 use rand::seq::SliceRandom;
@@ -18,10 +19,15 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Unknowns beside the gain: offset, inertia of the rotor, viscous and Coulomb friction.
-const OWN: usize = 4;
 /// Highest share that counts, so that no column of a perfect model outweighs all others.
 const MOST: f64 = 0.999;
+
+/// What a torque without weight leaves, of what one with weight does, for weight to be missing.
+const WEIGHTLESS: f64 = 0.7;
+
+/// Starts at a time, and how many of them must end in the best order for no more to be tried.
+const BATCH: usize = 24;
+const AGREE: usize = 4;
 
 /// Signals at some samples: `[column][sample]`.
 pub(super) struct Signals {
@@ -47,10 +53,14 @@ pub(super) struct Match {
     pub share: f64,
     /// share that the rigid torque explains of what friction and offset leave
     pub rigid: f64,
-    /// gain `c`: column for each N m
+    /// gain `c`: column for each N m; where the rigid torque explains nothing, only its sign, that of friction, counts
     pub gain: f64,
     /// whether the weight is missing in it
     pub weightless: bool,
+    /// which friction there is, a number of [`KINDS`]
+    kind: usize,
+    /// the rigid torque, 0 as a whole, 1 without weight, and 2 none
+    side: usize,
 }
 
 /// Samples with what does not depend on the hypothesis.
@@ -59,82 +69,28 @@ pub(super) struct Problem<'a> {
     phi: Vec<f64>,
     signals: &'a Signals,
     count: usize,
-    /// orthonormal columns of the own terms of each candidate
-    own: Vec<Vec<Vec<f64>>>,
-    /// what they leave of each column of torques, `[candidate][column]`, and the sign of the friction in it
-    rest: Vec<Vec<(Vec<f64>, f64, f64)>>,
+    /// own terms of each candidate
+    own: Vec<Own>,
+    /// each column of torques along them, `[candidate][column]`
+    along: Vec<Vec<Along>>,
     total: Vec<f64>,
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-fn without(x: &[f64], basis: &[Vec<f64>]) -> Vec<f64> {
-    let mut out = x.to_vec();
-    for b in basis {
-        let c = dot(&out, b);
-        out.iter_mut().zip(b).for_each(|(o, b)| *o -= c * b);
-    }
-    out
 }
 
 impl<'a> Problem<'a> {
     pub fn new(plant: &'a Plant, signals: &'a Signals) -> Self {
         let count = signals.q.first().map_or(0, Vec::len);
-        let mut own = Vec::new();
-        for p in 0..signals.q.len() {
-            let v = &signals.qd[p];
-            let usual = (dot(v, v) / count.max(1) as f64).sqrt();
-            let columns: [Vec<f64>; OWN] = [
-                vec![1.0; count],
-                signals.qdd[p].clone(),
-                v.clone(),
-                // friction turns over smoothly where the sign of a filtered velocity is not known
-                v.iter()
-                    .map(|x| (x / (0.05 * usual).max(1e-12)).tanh())
-                    .collect(),
-            ];
-            let mut basis: Vec<Vec<f64>> = Vec::new();
-            // one joint alone: its inertia is the model's, which gives the gain
-            let alone = signals.q.len() == 1;
-            for (which, c) in columns.into_iter().enumerate() {
-                if alone && which == 1 {
-                    continue;
-                }
-                let rest = without(&without(&c, &basis), &basis);
-                let (norm, whole) = (dot(&rest, &rest).sqrt(), dot(&c, &c).sqrt());
-                if norm > 1e-9 * whole.max(1e-300) {
-                    basis.push(rest.iter().map(|x| x / norm).collect());
-                }
-            }
-            own.push(basis);
-        }
-        let mean = vec![vec![1.0 / (count.max(1) as f64).sqrt(); count]];
-        let total = signals
-            .y
+        // one joint alone: its inertia is the model's, which gives the gain
+        let alone = signals.q.len() == 1;
+        let own: Vec<Own> = signals
+            .qd
             .iter()
-            .map(|y| {
-                let r = without(y, &mean);
-                dot(&r, &r)
-            })
+            .zip(&signals.qdd)
+            .map(|(v, a)| Own::new(v, a, alone))
             .collect();
-        let rest = own
+        let total = signals.y.iter().map(|y| spread(y)).collect();
+        let along = own
             .iter()
-            .enumerate()
-            .map(|(p, basis)| {
-                signals
-                    .y
-                    .iter()
-                    .map(|y| {
-                        // drag: how the column goes with the velocity
-                        let v = without(&signals.qd[p], &mean);
-                        let drag = dot(y, &v);
-                        let size = (dot(&v, &v) * dot(y, y)).sqrt();
-                        (without(y, basis), drag, drag.abs() / size.max(1e-300))
-                    })
-                    .collect()
-            })
+            .map(|o| signals.y.iter().map(|y| o.along(y)).collect())
             .collect();
         Problem {
             phi: plant
@@ -147,7 +103,7 @@ impl<'a> Problem<'a> {
             signals,
             count,
             own,
-            rest,
+            along,
             total,
         }
     }
@@ -183,47 +139,39 @@ impl<'a> Problem<'a> {
         let [rigid, weight] = self.torques(h, ws);
         (0..h.column.len())
             .map(|j| {
-                let p = h.column[j];
                 let full = &rigid[j * m..(j + 1) * m];
                 let light: Vec<f64> = full
                     .iter()
                     .zip(&weight[j * m..])
                     .map(|(a, b)| a - b)
                     .collect();
-                let sides = [without(full, &self.own[p]), without(&light, &self.own[p])];
+                let own = &self.own[h.column[j]];
+                let sides = [full, &light[..]].map(|x| (x, own.along(x)));
                 (0..self.signals.y.len())
                     .map(|c| {
-                        let (rest, drag, share_drag) = &self.rest[p][c];
-                        let left = dot(rest, rest);
-                        // what friction and offset explain alone, with the sign with which they brake
-                        let mut best = Match {
-                            share: 1.0 - left / self.total[c].max(1e-300),
-                            gain: drag * h.sign[j],
-                            ..Match::default()
-                        };
-                        for (k, side) in sides.iter().enumerate() {
-                            let (xx, xy) = (dot(side, side), dot(side, rest));
-                            if !(xx > 1e-9 * dot(full, full)) || !(left > 0.0) {
-                                continue;
-                            }
-                            let gain = xy / xx;
-                            // friction that drives is none: with this sign the column is not explained
-                            let drives = gain * h.sign[j] * drag < 0.0 && *share_drag > 0.2;
-                            let rigid = if drives { 0.0 } else { xy * xy / (xx * left) };
-                            if rigid > best.rigid {
-                                best = Match {
-                                    share: 1.0 - left * (1.0 - rigid) / self.total[c].max(1e-300),
-                                    rigid,
-                                    gain,
-                                    weightless: k == 1,
-                                };
-                            }
-                        }
-                        best
+                        let along = &self.along[h.column[j]][c];
+                        let y = (&self.signals.y[c][..], along, self.total[c]);
+                        explain(own, h.sign[j], &sides, y)
                     })
                     .collect()
             })
             .collect()
+    }
+
+    /// How its best joint explains a column of torques at each of some other samples of it, `[which]`.
+    pub fn shifted(&self, h: &Hypothesis, j: usize, other: &[Vec<f64>]) -> Vec<Match> {
+        let m = self.count;
+        let [rigid, weight] = self.torques(h, &mut Workspace::default());
+        let full = &rigid[j * m..(j + 1) * m];
+        let pairs = full.iter().zip(&weight[j * m..]);
+        let light: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
+        let own = &self.own[h.column[j]];
+        let sides = [full, &light[..]].map(|x| (x, own.along(x)));
+        let of = |y: &Vec<f64>| {
+            let y = (&y[..], &own.along(y), spread(y));
+            explain(own, h.sign[j], &sides, y)
+        };
+        other.iter().map(of).collect()
     }
 
     /// Share of each column that its best joint explains.
@@ -263,7 +211,7 @@ impl<'a> Problem<'a> {
     }
 
     /// What one sample-wise loss each column leaves under a hypothesis: the squares of the residual of the best joint,
-    /// with coefficients from the samples of `fit`, relative to the variance there.
+    /// with coefficients from the samples of `fit`.
     pub fn losses(
         &self,
         h: &Hypothesis,
@@ -272,35 +220,33 @@ impl<'a> Problem<'a> {
         ws: &mut Workspace,
     ) -> Vec<Vec<f64>> {
         let m = self.count;
+        let all = self.matches(h, ws);
         let [rigid, weight] = self.torques(h, ws);
         of.iter()
             .enumerate()
             .map(|(c, &j)| {
-                let p = h.column[j];
                 let y = &self.signals.y[c];
+                let found = &all[j][c];
                 let full = &rigid[j * m..(j + 1) * m];
-                let light: Vec<f64> = full
-                    .iter()
-                    .zip(&weight[j * m..])
-                    .map(|(a, b)| a - b)
-                    .collect();
-                [full, &light[..]]
-                    .into_iter()
-                    .map(|side| residual(y, &self.own[p], side, fit))
-                    .min_by(|a, b| {
-                        let sum = |r: &Vec<f64>| {
-                            r.iter()
-                                .zip(fit)
-                                .filter(|(_, f)| **f)
-                                .map(|(x, _)| x * x)
-                                .sum::<f64>()
-                        };
-                        sum(a).total_cmp(&sum(b))
-                    })
-                    .unwrap_or_default()
-                    .into_iter()
-                    .map(|x| x * x)
-                    .collect()
+                let side: Option<Vec<f64>> = match found.side {
+                    0 => Some(full.to_vec()),
+                    1 => Some(
+                        full.iter()
+                            .zip(&weight[j * m..])
+                            .map(|(a, b)| a - b)
+                            .collect(),
+                    ),
+                    _ => None,
+                };
+                residual(
+                    y,
+                    &self.own[h.column[j]].basis(found.kind),
+                    side.as_deref(),
+                    fit,
+                )
+                .into_iter()
+                .map(|x| x * x)
+                .collect()
             })
             .collect()
     }
@@ -365,10 +311,15 @@ impl<'a> Problem<'a> {
                 .for_each(|s| *s = if random.random_bool(0.5) { 1.0 } else { -1.0 });
             starts.push(h);
         }
-        let mut found: Vec<(f64, Hypothesis)> = starts
-            .into_par_iter()
-            .map(|h| self.climb(h, fits))
-            .collect();
+        // until several of them have ended in the best
+        let mut found: Vec<(f64, Hypothesis)> = Vec::new();
+        for batch in starts.chunks(BATCH) {
+            found.par_extend(batch.to_vec().into_par_iter().map(|h| self.climb(h, fits)));
+            let best = found.iter().map(|f| f.0).fold(f64::MIN, f64::max);
+            if found.iter().filter(|f| f.0 > best - 1e-6).count() > AGREE {
+                break;
+            }
+        }
         // what is stated may be beyond a limit; what was found may not
         found.retain(|(_, h)| fits(h) || h == stated);
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -377,39 +328,67 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// What own terms and a rigid torque leave of a column, with coefficients from the samples of `fit`.
-fn residual(y: &[f64], own: &[Vec<f64>], side: &[f64], fit: &[bool]) -> Vec<f64> {
-    let mask = |x: &[f64]| -> Vec<f64> {
-        x.iter()
-            .zip(fit)
-            .map(|(x, f)| if *f { *x } else { 0.0 })
-            .collect()
+/// Squares about the mean.
+fn spread(y: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    y.iter().map(|x| (x - mean) * (x - mean)).sum()
+}
+
+/// How a joint explains a column: its own terms and sign, its rigid torque as a whole and without weight, and the column
+/// with its square about the mean.
+fn explain(
+    own: &Own,
+    sign: f64,
+    sides: &[(&[f64], Along); 2],
+    (values, y, total): (&[f64], &Along, f64),
+) -> Match {
+    let mut best = Match {
+        side: 2,
+        kind: KINDS.len() - 1,
+        ..Match::default()
     };
-    // Gram-Schmidt on the fitted samples, carried along on all
-    let mut basis: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
-    let columns = own.iter().map(Vec::as_slice).chain([side]);
-    for column in columns {
-        let mut whole = column.to_vec();
-        for _ in 0..2 {
-            let part = mask(&whole);
-            for (b, all) in &basis {
-                let c = dot(&part, b);
-                whole.iter_mut().zip(all).for_each(|(w, a)| *w -= c * a);
+    // friction and offset alone
+    let mut alone = f64::INFINITY;
+    for kind in 0..KINDS.len() {
+        let [v, f] = own.friction(kind, y, &Along::default(), 0.0);
+        let left = y.left(kind).max(0.0);
+        if v * f >= 0.0 && left < alone {
+            alone = left;
+            best.gain = (v + f).signum() * sign * f64::MIN_POSITIVE;
+            best.kind = kind;
+        }
+    }
+    let mut left = alone;
+    let mut bound = alone;
+    let least = 1e-9 * sides[0].1.square();
+    for (k, (side, x)) in sides.iter().enumerate() {
+        let product = dot(side, values);
+        for kind in 0..KINDS.len() {
+            let xx = x.left(kind);
+            if !(xx > least) {
+                continue;
             }
+            let xy = product - x.shared(y, kind);
+            let gain = xy / xx;
+            let after = (y.left(kind) - gain * xy).max(0.0);
+            // that weight is missing must show
+            if after >= left || k == 1 && after >= bound {
+                continue;
+            }
+            // friction brakes: it has the sign of the gain
+            let [v, f] = own.friction(kind, y, x, gain);
+            let with = gain * sign;
+            if v * with < 0.0 || f * with < 0.0 {
+                continue;
+            }
+            left = after;
+            best.gain = gain;
+            best.weightless = k == 1;
+            (best.kind, best.side) = (kind, k);
         }
-        let part = mask(&whole);
-        let norm = dot(&part, &part).sqrt();
-        if norm > 1e-9 * dot(column, column).sqrt().max(1e-300) {
-            basis.push((
-                part.iter().map(|x| x / norm).collect(),
-                whole.iter().map(|x| x / norm).collect(),
-            ));
-        }
+        bound = WEIGHTLESS * left;
     }
-    let mut rest = y.to_vec();
-    for (b, all) in &basis {
-        let c = dot(&mask(&rest), b);
-        rest.iter_mut().zip(all).for_each(|(r, a)| *r -= c * a);
-    }
-    rest
+    best.share = 1.0 - left / total.max(1e-300);
+    best.rigid = 1.0 - left / alone.max(1e-300);
+    best
 }

@@ -23,6 +23,8 @@ pub(super) struct Verdict {
     pub joint: Vec<bool>,
     /// whether the turned sign does not, either
     pub sign: Vec<bool>,
+    /// signs of all joints that come near, with what speaks against them, nats
+    near: Vec<(Vec<f64>, f64)>,
     /// whether all hypotheses that come near give a column of torques to the same joint
     pub torque: Vec<bool>,
 }
@@ -75,11 +77,17 @@ impl Verdict {
         let mut out = Verdict {
             joint: vec![true; n],
             sign: vec![true; n],
+            near: vec![(best.sign.clone(), 0.0)],
             torque: vec![true; of.len()],
         };
         for rival in rivals {
-            if better(problem, best, &rival) {
+            let [gain, error] = margin(problem, best, &rival);
+            if clear(gain, error) {
                 continue;
+            }
+            if rival.column == best.column {
+                let behind = (gain / error.max(1e-9)).clamp(0.0, 4.0);
+                out.near.push((rival.sign.clone(), 0.5 * behind * behind));
             }
             let other = problem.best_joints(&rival, &mut ws);
             for (c, same) in out.torque.iter_mut().enumerate() {
@@ -98,9 +106,8 @@ impl Verdict {
     }
 }
 
-/// Whether `a` predicts held-out blocks better than `b`, beyond doubt.
-pub(super) fn better(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> bool {
-    let [gain, error] = margin(problem, a, b);
+/// Whether a gain on held-out blocks is beyond doubt.
+fn clear(gain: f64, error: f64) -> bool {
     gain > CLEAR && gain > SURE * error
 }
 
@@ -166,19 +173,24 @@ fn margin(problem: &Problem, a: &Hypothesis, b: &Hypothesis) -> [f64; 2] {
     [sum, error]
 }
 
-/// Confidence of a sign that only its being usual speaks for.
-pub(super) const LIKELY_SIGN: f64 = 0.6;
+/// One column in as many is turned.
+const TURNED: f64 = 5.0;
+/// Highest confidence of a sign that the torques do not tell beyond doubt.
+const LIKELY_SIGN: f64 = 0.85;
 
 /// Which way a joint's column of positions counts.
 pub(super) struct Orientation {
-    /// whether joint and sign are told
+    /// whether the joint is told
     pub known: bool,
+    /// whether the torques tell the sign
+    pub told: bool,
     pub sign: f64,
     pub confidence: f64,
 }
 
 /// The sign of each joint: by the model, or, where turning the positions and the torques together changes nothing that is
-/// seen, the usual one: none of them turned, if they agree with one another.
+/// seen, the one with which fewer columns are turned. Joints that only turn together, as those of an arm and its mirror
+/// image, are turned together.
 pub(super) fn orientation(
     best: &Hypothesis,
     verdict: &Verdict,
@@ -187,31 +199,48 @@ pub(super) fn orientation(
     positions: &[usize],
     torques: &[usize],
 ) -> Vec<Orientation> {
-    (0..best.column.len())
+    let n = best.column.len();
+    // how many more columns of a joint are as they stand than turned, with its position as it stands
+    let usual: Vec<f64> = (0..n)
         .map(|j| {
-            if verdict.sure(j) {
-                return Orientation {
-                    known: true,
-                    sign: best.sign[j],
-                    confidence: 0.95,
-                };
-            }
             let p = positions[best.column[j]];
-            let rates = claims
-                .iter()
-                .filter(|c| c.of == Some(p))
-                .all(|c| c.sign > 0.0);
+            let rates = claims.iter().filter(|c| c.of == Some(p)).map(|c| c.sign);
             let mine = (0..torques.len()).filter(|&c| {
                 let share = matches[j][c].share;
                 share > SHARE && share >= matches.iter().map(|r| r[c].share).fold(0.0, f64::max)
             });
-            // with positions as they are, the gains that belong to them
-            let mut gains = mine.map(|c| matches[j][c].gain * best.sign[j]).peekable();
-            let agree = gains.peek().is_some() && gains.all(|g| g > 0.0);
+            let gains = mine.map(|c| (matches[j][c].gain * best.sign[j]).signum());
+            rates.chain(gains).sum::<f64>() + 1.0
+        })
+        .collect();
+    let odds: Vec<f64> = verdict
+        .near
+        .iter()
+        .map(|(signs, behind)| {
+            let turned: f64 = signs.iter().zip(&usual).map(|(s, u)| s * u).sum();
+            0.5 * turned * (TURNED - 1.0).ln() - behind
+        })
+        .collect();
+    let most = odds.iter().copied().fold(f64::MIN, f64::max);
+    let chosen = odds.iter().position(|o| *o >= most).unwrap_or(0);
+    let chosen = &verdict.near[chosen].0;
+    (0..n)
+        .map(|j| {
+            let (mut same, mut all) = (0.0, 0.0);
+            for ((signs, _), o) in verdict.near.iter().zip(&odds) {
+                let weight = (o - most).exp();
+                all += weight;
+                same += if signs[j] == chosen[j] { weight } else { 0.0 };
+            }
+            let told = verdict.sign[j];
             Orientation {
-                known: verdict.joint[j] && rates && agree,
-                sign: 1.0,
-                confidence: LIKELY_SIGN,
+                known: verdict.joint[j],
+                told,
+                sign: chosen[j],
+                confidence: match told {
+                    true => 0.95,
+                    false => (same / all).clamp(0.5, LIKELY_SIGN),
+                },
             }
         })
         .collect()

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod blind;
 mod formats;
 mod log;
 mod signals;
