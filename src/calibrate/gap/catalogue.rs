@@ -110,6 +110,24 @@ pub struct Catalogue {
     pub bases: Vec<usize>,
 }
 
+/// Sides of a play that gravity and friction close together, `tanh((τ_g / max τ_g + f s) / w)`: name, `f`, `w`. Where
+/// friction holds more than gravity pulls, the play stays on the side the joint came from. That side is one where a drive
+/// turns the joint, and the other where the arm is led by hand. Without friction the side may be undecided where gravity
+/// is weak.
+const CLOSED: [(&str, f64, f64); 5] = [
+    ("play_undecided", 0.0, 0.3),
+    ("play_light_friction", 0.2, SOFT),
+    ("play_heavy_friction", 0.5, SOFT),
+    ("play_light_friction_led", -0.2, SOFT),
+    ("play_heavy_friction_led", -0.5, SOFT),
+];
+
+/// Whether a number depends on the side that the joint came from.
+pub fn by_approach(name: &str) -> bool {
+    let closed = CLOSED.iter().any(|c| c.0 == name && c.1 != 0.0);
+    closed || name == "play_by_approach"
+}
+
 /// One column that is to be added.
 struct Column {
     name: &'static str,
@@ -240,7 +258,7 @@ impl Catalogue {
                 unit,
                 prior: play,
                 part: Part::Backlash,
-                values: came,
+                values: came.clone(),
             };
             add("backlash", false, vec![column]);
         }
@@ -271,7 +289,7 @@ impl Catalogue {
         let legs =
             matches!(&opened.kin, Kin::Parallel(p) if matches!(p.dimensions, Dimensions::Legs(_)));
         let sag = if turns { SAG } else { length } / most;
-        let soft = one("compliance", by_load, sag, Part::Compliance, load);
+        let soft = one("compliance", by_load, sag, Part::Compliance, load.clone());
         if legs {
             add("leg_compliance", true, soft);
             if varies(&sides) {
@@ -284,6 +302,20 @@ impl Catalogue {
         if varies(&sides) {
             let load_play = one("play", unit, play, Part::Backlash, sides);
             add("backlash", true, load_play);
+        }
+        if matches!(opened.kin, Kin::Arm(_)) {
+            for (name, friction, width) in CLOSED {
+                let closed = |(t, s): (&f64, &f64)| ((t / largest - friction * s) / width).tanh();
+                let sides: Vec<f64> = load.iter().zip(&came).map(closed).collect();
+                let own = friction == 0.0 || came.iter().any(|s| *s != came[0]);
+                if own && varies(&sides) {
+                    add(
+                        "backlash",
+                        true,
+                        one(name, unit, play, Part::Backlash, sides),
+                    );
+                }
+            }
         }
         if let Some(levers) = &c.lever {
             // by virtual work the force along the rod is the torque times the lever ∂q/∂l
