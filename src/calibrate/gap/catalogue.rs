@@ -51,7 +51,7 @@ pub const EFFECTS: [Effect; 10] = [
     },
     Effect {
         name: "backlash",
-        equation: "q + η sign(τ_g), or q + η s with the side s that the joint came from",
+        equation: "q + η sign(τ_g), or q + η s with the side s that the joint came from, or q + η sign(τ_g − f s) with friction f",
         separated_by: "the same postures approached from either side",
     },
     Effect {
@@ -110,21 +110,19 @@ pub struct Catalogue {
     pub bases: Vec<usize>,
 }
 
-/// Sides of a play that gravity and friction close together, `tanh((τ_g / max τ_g + f s) / w)`: name, `f`, `w`. Where
+/// Sides of a play that gravity and friction close together, `tanh((τ_g / max τ_g − f s) / w)`: name, `f`. Where
 /// friction holds more than gravity pulls, the play stays on the side the joint came from. That side is one where a drive
-/// turns the joint, and the other where the arm is led by hand. Without friction the side may be undecided where gravity
-/// is weak.
-const CLOSED: [(&str, f64, f64); 5] = [
-    ("play_undecided", 0.0, 0.3),
-    ("play_light_friction", 0.2, SOFT),
-    ("play_heavy_friction", 0.5, SOFT),
-    ("play_light_friction_led", -0.2, SOFT),
-    ("play_heavy_friction_led", -0.5, SOFT),
+/// turns the joint, and the other where the arm is led by hand.
+const CLOSED: [(&str, f64); 4] = [
+    ("play_light_friction", 0.2),
+    ("play_heavy_friction", 0.5),
+    ("play_light_friction_led", -0.2),
+    ("play_heavy_friction_led", -0.5),
 ];
 
 /// Whether a number depends on the side that the joint came from.
 pub fn by_approach(name: &str) -> bool {
-    let closed = CLOSED.iter().any(|c| c.0 == name && c.1 != 0.0);
+    let closed = CLOSED.iter().any(|c| c.0 == name);
     closed || name == "play_by_approach"
 }
 
@@ -304,10 +302,10 @@ impl Catalogue {
             add("backlash", true, load_play);
         }
         if matches!(opened.kin, Kin::Arm(_)) {
-            for (name, friction, width) in CLOSED {
-                let closed = |(t, s): (&f64, &f64)| ((t / largest - friction * s) / width).tanh();
+            for (name, friction) in CLOSED {
+                let closed = |(t, s): (&f64, &f64)| ((t / largest - friction * s) / SOFT).tanh();
                 let sides: Vec<f64> = load.iter().zip(&came).map(closed).collect();
-                let own = friction == 0.0 || came.iter().any(|s| *s != came[0]);
+                let own = came.iter().any(|s| *s != came[0]);
                 if own && varies(&sides) {
                     add(
                         "backlash",
