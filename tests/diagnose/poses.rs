@@ -26,6 +26,8 @@ enum Withheld {
     Play(usize, f64),
     /// by the side to which gravity pulls
     Sag(usize, f64),
+    /// by gravity where it pulls harder than this friction, N m, and else by the side that the joint comes from
+    Held(usize, f64, f64),
     /// the base in the last group, m
     Base(f64),
     /// base joint of a leg, m
@@ -233,6 +235,14 @@ fn arm(what: Withheld, seed: u64, reach: f64) -> PoseDiagnosis {
             Compliance(j, by) => at[j] += by * torque(&q, j),
             Play(j, by) => at[j] -= 0.5 * by * (q[j] - before[j]).signum(),
             Sag(j, by) => at[j] += 0.5 * by * torque(&q, j).signum(),
+            Held(j, by, friction) => {
+                let pull = torque(&q, j);
+                let side = match pull.abs() > friction {
+                    true => pull.signum(),
+                    false => -(q[j] - before[j]).signum(),
+                };
+                at[j] += 0.5 * by * side;
+            }
             Square(j, by) => at[j] += by * (7.0 * q[j]).sin().signum(),
             _ => {}
         }
@@ -391,6 +401,21 @@ fn withheld_effects_of_an_arm_are_named() {
     case(Sag(2, 8e-4), "backlash", &["j3"]);
     case(Base(1e-3), "base_pose", &["c"]);
     assert!(wrong <= 1, "{wrong} of 36 are not named");
+}
+
+#[test]
+fn play_that_friction_and_gravity_close_together_is_named_and_nothing_else() {
+    let (mut wrong, mut others) = (0, 0);
+    for (joint, friction, place) in [(1, 40.0, "j2"), (2, 4.0, "j3"), (2, 10.0, "j3")] {
+        let what = Held(joint, 1.6e-3, friction);
+        let all: Vec<_> = SEEDS.map(|s| claims(&arm(what, s, 2.2))).collect();
+        let play = |c: &(String, Vec<String>)| c.0 == "backlash" && c.1 == [place];
+        println!("arm {what:?}: {all:?}");
+        wrong += all.iter().filter(|c| !c.iter().any(play)).count();
+        others += all.iter().flatten().filter(|c| !play(c)).count();
+    }
+    assert_eq!(others, 0, "effects that are not there are named");
+    assert!(wrong <= 1, "{wrong} of 12 are not named");
 }
 
 #[test]

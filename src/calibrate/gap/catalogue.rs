@@ -51,7 +51,7 @@ pub const EFFECTS: [Effect; 10] = [
     },
     Effect {
         name: "backlash",
-        equation: "q + η sign(τ_g), or q + η s with the side s that the joint came from",
+        equation: "q + η sign(τ_g), or q + η s with the side s that the joint came from, or q + η sign(τ_g − f s) with friction f",
         separated_by: "the same postures approached from either side",
     },
     Effect {
@@ -108,6 +108,22 @@ pub struct Catalogue {
     pub rates: Vec<Vec<Rate>>,
     /// groups whose base may have moved
     pub bases: Vec<usize>,
+}
+
+/// Sides of a play that gravity and friction close together, `tanh((τ_g / max τ_g − f s) / w)`: name, `f`. Where
+/// friction holds more than gravity pulls, the play stays on the side the joint came from. That side is one where a drive
+/// turns the joint, and the other where the arm is led by hand.
+const CLOSED: [(&str, f64); 4] = [
+    ("play_light_friction", 0.2),
+    ("play_heavy_friction", 0.5),
+    ("play_light_friction_led", -0.2),
+    ("play_heavy_friction_led", -0.5),
+];
+
+/// Whether a number depends on the side that the joint came from.
+pub fn by_approach(name: &str) -> bool {
+    let closed = CLOSED.iter().any(|c| c.0 == name);
+    closed || name == "play_by_approach"
 }
 
 /// One column that is to be added.
@@ -240,7 +256,7 @@ impl Catalogue {
                 unit,
                 prior: play,
                 part: Part::Backlash,
-                values: came,
+                values: came.clone(),
             };
             add("backlash", false, vec![column]);
         }
@@ -271,7 +287,7 @@ impl Catalogue {
         let legs =
             matches!(&opened.kin, Kin::Parallel(p) if matches!(p.dimensions, Dimensions::Legs(_)));
         let sag = if turns { SAG } else { length } / most;
-        let soft = one("compliance", by_load, sag, Part::Compliance, load);
+        let soft = one("compliance", by_load, sag, Part::Compliance, load.clone());
         if legs {
             add("leg_compliance", true, soft);
             if varies(&sides) {
@@ -284,6 +300,20 @@ impl Catalogue {
         if varies(&sides) {
             let load_play = one("play", unit, play, Part::Backlash, sides);
             add("backlash", true, load_play);
+        }
+        if matches!(opened.kin, Kin::Arm(_)) {
+            for (name, friction) in CLOSED {
+                let closed = |(t, s): (&f64, &f64)| ((t / largest - friction * s) / SOFT).tanh();
+                let sides: Vec<f64> = load.iter().zip(&came).map(closed).collect();
+                let own = came.iter().any(|s| *s != came[0]);
+                if own && varies(&sides) {
+                    add(
+                        "backlash",
+                        true,
+                        one(name, unit, play, Part::Backlash, sides),
+                    );
+                }
+            }
         }
         if let Some(levers) = &c.lever {
             // by virtual work the force along the rod is the torque times the lever ∂q/∂l

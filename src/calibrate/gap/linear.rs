@@ -277,8 +277,13 @@ impl<'a> Bed<'a> {
             let eigen = problem.information(&p.columns).symmetric_eigen();
             !(eigen.eigenvalues.max() > SEEN * SEEN)
         };
-        Ok((self.places.iter().filter(unseen))
-            .map(|p| (p.effect, p.name.clone()))
-            .collect())
+        // one effect at one place may have several columns: that one shows is enough
+        let own = |p: &Place| (p.effect, p.name.clone());
+        let (hidden, shown): (Vec<&Place>, Vec<&Place>) = self.places.iter().partition(unseen);
+        let shown: Vec<_> = shown.into_iter().map(own).collect();
+        let mut all: Vec<_> = hidden.into_iter().map(own).collect();
+        all.retain(|p| !shown.contains(p));
+        all.dedup();
+        Ok(all)
     }
 }

@@ -3,7 +3,7 @@
 //! With the information of the rows at hand, the postures are chosen one after another that leave most of the first
 //! effect when set-up, the other findings and the rival are free: `max ln det Λ_{e|s,r}`.
 
-use super::catalogue::Catalogue;
+use super::catalogue::{self, Catalogue};
 use super::conditions::Conditions;
 use super::linear::Bed;
 use super::verdict::Found;
@@ -206,7 +206,7 @@ pub(super) fn next(
         bed.places[*p]
             .columns
             .iter()
-            .any(|&c| bed.name(c).0 == "play_by_approach")
+            .any(|&c| catalogue::by_approach(&bed.name(c).0))
     });
     let name = |effect: &str, place: &str| format!("{effect} ({place})");
     Ok(Some(Next {

@@ -323,6 +323,9 @@ fn finding(
             .iter()
             .filter(|p| bed.places[**p].effect == place.effect)
         {
+            if places.contains(&bed.places[p].name) {
+                continue;
+            }
             joints.extend(bed.places[p].joints.iter().cloned());
             places.push(bed.places[p].name.clone());
         }
