@@ -574,11 +574,12 @@ fn a_base_that_stands_on_its_own_frame_has_a_floor() {
 
     let deep = arm(&BASE.replace("0 0 0.15", "0 0 0.05"), UPPER, LOWER, "");
     let scene = scene_of(&stated(&deep, ""));
-    assert_eq!(floors(&scene), 0);
+    // where the base ends, and that is said
+    assert_eq!(floors(&scene), 1);
     warned(
         &scene.warnings,
         WarningKind::CollisionNotChecked,
-        &["floor", "0.10 m below"],
+        &["floor", "0.100 m below", "at z = -0.100 m"],
     );
     let scene = scene_of(&stated(&deep, "[collision]\nfloor = true\n"));
     assert_eq!(floors(&scene), 1);
