@@ -16,7 +16,7 @@ use super::linear::{self, Weights, inverse_information, weighted_row};
 use super::stack::Stack;
 use crate::error::Result;
 use crate::plant::Plant;
-use crate::signals::fourier::{Complex, Plan};
+use crate::signals::fourier::Plan;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -29,29 +29,12 @@ pub struct Covariance {
     pub inflation: f64,
 }
 
-/// Two real signals transformed at once: half the work. Returns the first half of both spectra.
-fn pair(plan: &Plan, a: &[f64], b: &[f64]) -> [Vec<Complex>; 2] {
-    let n = a.len();
-    let z: Vec<Complex> = a.iter().zip(b).map(|(x, y)| [*x, *y]).collect();
-    let t = plan.transform(&z);
-    let half = n / 2 + 1;
-    let mut out = [Vec::with_capacity(half), Vec::with_capacity(half)];
-    for k in 0..half {
-        let (p, q) = (t[k], t[(n - k) % n]);
-        out[0].push([0.5 * (p[0] + q[0]), 0.5 * (p[1] - q[1])]);
-        out[1].push([0.5 * (p[1] + q[1]), 0.5 * (q[0] - p[0])]);
-    }
-    out
-}
-
 /// Spectrum of a residual of which `used` samples are not left out (zero), 1 for white noise of unit
 /// variance, smoothed over about `√m` bins.
-fn smooth_spectrum(plan: &Plan, e: &[f64], used: usize) -> Vec<f64> {
+fn smooth_spectrum(plan: &Plan, e: Vec<f64>, used: usize) -> Vec<f64> {
     let m = e.len();
-    let [s, _] = pair(plan, e, e);
-    let raw: Vec<f64> = s
-        .iter()
-        .map(|c| (c[0] * c[0] + c[1] * c[1]) / used.max(1) as f64)
+    let raw: Vec<f64> = (plan.spectrum(e).iter())
+        .map(|c| c.norm_sqr() / used.max(1) as f64)
         .collect();
     let half = raw.len();
     let wide = ((m as f64).sqrt() / 4.0).ceil().max(2.0) as isize;
@@ -93,7 +76,7 @@ pub fn covariance(
     let freedom = rows as f64 / (rows.saturating_sub(b)).max(1) as f64;
     let mut jobs = Vec::new();
     let right: Vec<Vec<f64>> = stacks.iter().map(|s| s.tau()).collect();
-    let plans: Vec<Plan> = stacks.iter().map(|s| Plan::new(s.count, false)).collect();
+    let plans: Vec<Plan> = stacks.iter().map(|s| Plan::new(s.count)).collect();
     for (i, s) in stacks.iter().enumerate() {
         jobs.extend((0..s.actuators).map(|a| (i, a)));
     }
@@ -108,19 +91,16 @@ pub fn covariance(
             let residual: Vec<f64> = (0..m)
                 .map(|k| block[(k, b)] - (0..b).map(|c| block[(k, c)] * pi[c]).sum::<f64>())
                 .collect();
-            let density = smooth_spectrum(plan, &residual, stacks[i].used(a));
+            let density = smooth_spectrum(plan, residual, stacks[i].used(a));
             let half = density.len();
             let mut z = Mat::<f64>::zeros(2 * half, b);
-            for c in (0..b).step_by(2) {
-                let spectra = pair(plan, &column(c), &column((c + 1).min(b - 1)));
-                for (d, spectrum) in spectra.iter().enumerate().take(b - c) {
-                    for k in 0..half {
-                        // frequencies between 0 and the highest stand for their mirror image too
-                        let twice = if k == 0 || (2 * k == m) { 1.0 } else { 2.0 };
-                        let w = (twice * density[k] / m as f64).sqrt();
-                        z[(2 * k, c + d)] = w * spectrum[k][0];
-                        z[(2 * k + 1, c + d)] = w * spectrum[k][1];
-                    }
+            for c in 0..b {
+                for (k, x) in plan.spectrum(column(c)).iter().enumerate() {
+                    // frequencies between 0 and the highest stand for their mirror image too
+                    let twice = if k == 0 || (2 * k == m) { 1.0 } else { 2.0 };
+                    let w = (twice * density[k] / m as f64).sqrt();
+                    z[(2 * k, c)] = w * x.re;
+                    z[(2 * k + 1, c)] = w * x.im;
                 }
             }
             z.transpose() * &z

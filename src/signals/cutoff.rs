@@ -1,6 +1,7 @@
 //! The cut-off of the positions, from their spectrum.
 
 use super::fourier::{spectrum, welch};
+use realfft::num_complex::Complex64;
 use std::f64::consts::PI;
 
 /// A cut-off and how it was found.
@@ -167,12 +168,12 @@ pub fn periodic(periods: &[&[f64]], period: f64) -> (usize, Cutoff) {
     let mut density = vec![0.0; bins];
     let mut scatter = vec![0.0; bins];
     for k in 1..bins {
-        let mean = [0, 1].map(|c| all.iter().map(|s| s[k][c]).sum::<f64>() / count);
-        density[k] = scale * (mean[0] * mean[0] + mean[1] * mean[1]);
+        let mean = all.iter().map(|s| s[k]).sum::<Complex64>() / count;
+        density[k] = scale * mean.norm_sqr();
         // variance of the mean
         let spread: f64 = all
             .iter()
-            .map(|s| (s[k][0] - mean[0]).powi(2) + (s[k][1] - mean[1]).powi(2))
+            .map(|s| (s[k] - mean).norm_sqr())
             .sum();
         scatter[k] = scale * spread / ((count - 1.0).max(1.0) * count);
     }

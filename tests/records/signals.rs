@@ -107,7 +107,7 @@ fn any_length_is_transformed_and_periodic_signals_are_differentiated_exactly() {
     for n in [1usize, 2, 7, 64, 120, 6240, 997] {
         let x: Vec<f64> = signal(n);
         let s = fourier::spectrum(&x);
-        for k in [0, 1, n / 3, n - 1] {
+        for k in [0, 1, n / 3, n / 2] {
             let (mut re, mut im) = (0.0, 0.0);
             for (i, v) in x.iter().enumerate() {
                 let a = -2.0 * PI * ((k * i) % n) as f64 / n as f64;
@@ -115,7 +115,7 @@ fn any_length_is_transformed_and_periodic_signals_are_differentiated_exactly() {
                 im += v * a.sin();
             }
             assert!(
-                (s[k % n][0] - re).abs() + (s[k % n][1] - im).abs() < 1e-9 * n as f64,
+                (s[k % n].re - re).abs() + (s[k % n].im - im).abs() < 1e-9 * n as f64,
                 "{n} {k}"
             );
         }

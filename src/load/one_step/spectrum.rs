@@ -11,7 +11,8 @@
 //! is its power there. What the columns of the fit have taken out of the residual, `h_i`, is made up for: without that
 //! the noise would seem smallest at the frequencies of the motion, where it counts.
 
-use crate::signals::fourier::{Complex, transform};
+use crate::signals::fourier::{signal, spectrum};
+use realfft::num_complex::Complex64;
 
 /// Degrees of freedom that a window must hold: the power is then known to 30 %.
 const FREEDOM: f64 = 20.0;
@@ -22,16 +23,14 @@ const LEAST: f64 = 1e-4;
 /// Orthonormal real transform: mean, then cosine and sine of every frequency, then the highest where the length is even.
 pub fn rows(x: &[f64]) -> Vec<f64> {
     let n = x.len();
-    let complex: Vec<Complex> = x.iter().map(|v| [*v, 0.0]).collect();
-    let f = transform(&complex, false);
     let scale = 1.0 / (n.max(1) as f64).sqrt();
     let mut out = Vec::with_capacity(n);
-    for (k, [re, im]) in f.iter().enumerate().take(n / 2 + 1) {
+    for (k, c) in spectrum(x).iter().enumerate() {
         if k == 0 || 2 * k == n {
-            out.push(scale * re);
+            out.push(scale * c.re);
         } else {
-            out.push(std::f64::consts::SQRT_2 * scale * re);
-            out.push(std::f64::consts::SQRT_2 * scale * im);
+            out.push(std::f64::consts::SQRT_2 * scale * c.re);
+            out.push(std::f64::consts::SQRT_2 * scale * c.im);
         }
     }
     out
@@ -41,21 +40,14 @@ pub fn rows(x: &[f64]) -> Vec<f64> {
 pub fn samples(rows: &[f64]) -> Vec<f64> {
     let n = rows.len();
     let scale = 1.0 / (n.max(1) as f64).sqrt();
-    let mut f: Vec<Complex> = vec![[0.0, 0.0]; n];
-    for k in 0..=n / 2 {
-        if k == 0 || 2 * k == n {
-            let at = if k == 0 { 0 } else { n - 1 };
-            if let (Some(to), Some(v)) = (f.get_mut(k), rows.get(at)) {
-                *to = [scale * v, 0.0];
-            }
-        } else {
-            let half = scale * std::f64::consts::FRAC_1_SQRT_2;
-            let (re, im) = (half * rows[2 * k - 1], half * rows[2 * k]);
-            f[k] = [re, im];
-            f[n - k] = [re, -im];
-        }
-    }
-    transform(&f, true).iter().map(|c| c[0]).collect()
+    let half = scale * std::f64::consts::FRAC_1_SQRT_2;
+    let at = |k: usize| match k {
+        0 => Complex64::from(scale * rows[0]),
+        _ if 2 * k == n => Complex64::from(scale * rows[n - 1]),
+        _ => Complex64::new(half * rows[2 * k - 1], half * rows[2 * k]),
+    };
+    let kept = if n > 0 { n / 2 + 1 } else { 0 };
+    signal((0..kept).map(at).collect(), n)
 }
 
 /// Noise whose rows have this power, normal.
