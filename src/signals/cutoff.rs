@@ -171,10 +171,7 @@ pub fn periodic(periods: &[&[f64]], period: f64) -> (usize, Cutoff) {
         let mean = all.iter().map(|s| s[k]).sum::<Complex64>() / count;
         density[k] = scale * mean.norm_sqr();
         // variance of the mean
-        let spread: f64 = all
-            .iter()
-            .map(|s| (s[k] - mean).norm_sqr())
-            .sum();
+        let spread: f64 = all.iter().map(|s| (s[k] - mean).norm_sqr()).sum();
         scatter[k] = scale * spread / ((count - 1.0).max(1.0) * count);
     }
     let largest = density.iter().cloned().fold(0.0, f64::max);
