@@ -65,8 +65,8 @@ impl<'a> Motions<'a> {
         if self.plant.looped() {
             return Vec::new();
         }
-        let mut all = Vec::new();
-        for (k, grid) in [Grid::Odd, Grid::Full].into_iter().enumerate() {
+        let grids = [Grid::Odd, Grid::Full].into_par_iter().enumerate();
+        let found = grids.with_max_len(1).filter_map(|(k, grid)| {
             let wanted = Design {
                 harmonics: T.motions.harmonics[usize::from(self.plant.closed())],
                 period: T.motions.period,
@@ -77,16 +77,25 @@ impl<'a> Motions<'a> {
                 ..Design::default()
             };
             // a robot that no motion of this period suits may have others
-            let Ok(found) = design(self.plant, &wanted) else {
-                continue;
-            };
-            for factor in T.motions.slower {
-                let mut motion = found.trajectory.fourier.clone();
-                motion.period *= factor;
-                all.push((motion, T.motions.often[1]));
-            }
-        }
-        all
+            design(self.plant, &wanted).ok()
+        });
+        let found: Vec<_> = found.collect();
+        let slowed = |motion: Fourier| {
+            T.motions.slower.map(|factor| {
+                let period = motion.period * factor;
+                (
+                    Fourier {
+                        period,
+                        ..motion.clone()
+                    },
+                    T.motions.often[1],
+                )
+            })
+        };
+        found
+            .into_iter()
+            .flat_map(|f| slowed(f.trajectory.fourier))
+            .collect()
     }
 
     /// Random motions about the middle of the records.
