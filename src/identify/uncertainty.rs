@@ -92,13 +92,16 @@ pub fn covariance(
                 .map(|k| block[(k, b)] - (0..b).map(|c| block[(k, c)] * pi[c]).sum::<f64>())
                 .collect();
             let density = smooth_spectrum(plan, residual, stacks[i].used(a));
-            let half = density.len();
-            let mut z = Mat::<f64>::zeros(2 * half, b);
+            let weight = |(k, density): (usize, &f64)| {
+                // frequencies between 0 and the highest stand for their mirror image too
+                let twice = if k == 0 || (2 * k == m) { 1.0 } else { 2.0 };
+                (twice * density / m as f64).sqrt()
+            };
+            let of_each: Vec<f64> = density.iter().enumerate().map(weight).collect();
+            let mut z = Mat::<f64>::zeros(2 * of_each.len(), b);
             for c in 0..b {
-                for (k, x) in plan.spectrum(column(c)).iter().enumerate() {
-                    // frequencies between 0 and the highest stand for their mirror image too
-                    let twice = if k == 0 || (2 * k == m) { 1.0 } else { 2.0 };
-                    let w = (twice * density[k] / m as f64).sqrt();
+                let spectrum = plan.spectrum(column(c));
+                for (k, (x, w)) in spectrum.iter().zip(&of_each).enumerate() {
                     z[(2 * k, c)] = w * x.re;
                     z[(2 * k + 1, c)] = w * x.im;
                 }

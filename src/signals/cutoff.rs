@@ -1,6 +1,6 @@
 //! The cut-off of the positions, from their spectrum.
 
-use super::fourier::{spectrum, welch};
+use super::fourier::{Plan, welch};
 use realfft::num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -161,7 +161,8 @@ pub fn aperiodic(q: &[f64], rate: f64, order: usize) -> Cutoff {
 pub fn periodic(periods: &[&[f64]], period: f64) -> (usize, Cutoff) {
     let n = periods.first().map_or(0, |p| p.len());
     let count = periods.len() as f64;
-    let all: Vec<_> = periods.iter().map(|p| spectrum(p)).collect();
+    let plan = Plan::new(n);
+    let all: Vec<_> = periods.iter().map(|p| plan.spectrum(p.to_vec())).collect();
     let bins = n.div_ceil(2);
     let scale = 2.0 * period / (n as f64 * n as f64);
     let frequency: Vec<f64> = (0..bins).map(|k| k as f64 / period).collect();

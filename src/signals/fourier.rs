@@ -1,7 +1,7 @@
 //! Spectra of real signals, and differentiation of periodic ones. The transforms are those of `rustfft`.
 
 use realfft::num_complex::Complex64;
-use realfft::{RealFftPlanner, RealToComplex};
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -33,18 +33,27 @@ pub fn spectrum(x: &[f64]) -> Vec<Complex64> {
     Plan::new(x.len()).spectrum(x.to_vec())
 }
 
-/// The signal of `count` samples with this spectrum, times `count`.
-///
-/// # Panics
-/// If the spectrum is not that of a real signal of this length.
-pub fn signal(mut spectrum: Vec<Complex64>, count: usize) -> Vec<f64> {
-    if count == 0 {
-        return Vec::new();
+/// What the ways back from spectra of one length share. `None` for a signal without samples.
+pub struct Inverse(Option<Arc<dyn ComplexToReal<f64>>>);
+
+impl Inverse {
+    /// For signals of `count` samples, any number; O(N log N).
+    pub fn new(count: usize) -> Inverse {
+        Inverse((count > 0).then(|| RealFftPlanner::new().plan_fft_inverse(count)))
     }
-    let back = RealFftPlanner::new().plan_fft_inverse(count);
-    let mut out = back.make_output_vec();
-    (back.process(&mut spectrum, &mut out)).expect("the spectrum of a real signal");
-    out
+
+    /// The signal with this spectrum, times the number of its samples. The spectrum is used up.
+    ///
+    /// # Panics
+    /// If the spectrum is not that of a real signal of the length that was planned.
+    pub fn signal(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
+        let Some(back) = &self.0 else {
+            return Vec::new();
+        };
+        let mut out = back.make_output_vec();
+        (back.process(&mut spectrum, &mut out)).expect("the spectrum of a real signal");
+        out
+    }
 }
 
 /// A signal of one period, low-passed to the harmonics up to `highest`, and its first two
@@ -56,6 +65,7 @@ pub fn derivatives(x: &[f64], period: f64, highest: usize) -> [Vec<f64>; 3] {
     let mean = x.iter().sum::<f64>() / n.max(1) as f64;
     let full = spectrum(&x.iter().map(|v| v - mean).collect::<Vec<_>>());
     let kept = n.div_ceil(2).min(highest.saturating_add(1));
+    let back = Inverse::new(n);
     std::array::from_fn(|d| {
         let mut y = vec![Complex64::ZERO; full.len()];
         for k in 1..kept {
@@ -65,7 +75,7 @@ pub fn derivatives(x: &[f64], period: f64, highest: usize) -> [Vec<f64>; 3] {
         if d == 0 && n > 0 {
             y[0] = mean.into();
         }
-        signal(y, n)
+        back.signal(y)
     })
 }
 

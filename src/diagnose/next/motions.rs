@@ -66,7 +66,7 @@ impl<'a> Motions<'a> {
             return Vec::new();
         }
         let grids = [Grid::Odd, Grid::Full].into_par_iter().enumerate();
-        let found = grids.with_max_len(1).filter_map(|(k, grid)| {
+        let designs = grids.with_max_len(1).filter_map(|(k, grid)| {
             let wanted = Design {
                 harmonics: T.motions.harmonics[usize::from(self.plant.closed())],
                 period: T.motions.period,
@@ -79,23 +79,14 @@ impl<'a> Motions<'a> {
             // a robot that no motion of this period suits may have others
             design(self.plant, &wanted).ok()
         });
-        let found: Vec<_> = found.collect();
-        let slowed = |motion: Fourier| {
+        let slowed = designs.flat_map_iter(|found| {
             T.motions.slower.map(|factor| {
-                let period = motion.period * factor;
-                (
-                    Fourier {
-                        period,
-                        ..motion.clone()
-                    },
-                    T.motions.often[1],
-                )
+                let mut motion = found.trajectory.fourier.clone();
+                motion.period *= factor;
+                (motion, T.motions.often[1])
             })
-        };
-        found
-            .into_iter()
-            .flat_map(|f| slowed(f.trajectory.fourier))
-            .collect()
+        });
+        slowed.collect()
     }
 
     /// Random motions about the middle of the records.

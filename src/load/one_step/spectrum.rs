@@ -11,7 +11,7 @@
 //! is its power there. What the columns of the fit have taken out of the residual, `h_i`, is made up for: without that
 //! the noise would seem smallest at the frequencies of the motion, where it counts.
 
-use crate::signals::fourier::{signal, spectrum};
+use crate::signals::fourier::{Inverse, spectrum};
 use realfft::num_complex::Complex64;
 
 /// Degrees of freedom that a window must hold: the power is then known to 30 %.
@@ -47,7 +47,7 @@ pub fn samples(rows: &[f64]) -> Vec<f64> {
         _ => Complex64::new(half * rows[2 * k - 1], half * rows[2 * k]),
     };
     let kept = if n > 0 { n / 2 + 1 } else { 0 };
-    signal((0..kept).map(at).collect(), n)
+    Inverse::new(n).signal((0..kept).map(at).collect())
 }
 
 /// Noise whose rows have this power, normal.
