@@ -6,6 +6,7 @@ use super::kind::Kind;
 use super::row::{Row, Source};
 use super::rows;
 use crate::error::{Error, Result, Warning};
+use crate::robot::holds_robot;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -376,7 +377,7 @@ fn beside(folder: &Path, name: &str) -> String {
     let path = folder.join(name);
     let is_path = Path::new(name).components().count() > 1
         || [".toml", ".urdf", ".xml"].iter().any(|e| name.ends_with(e));
-    match path.exists() || is_path {
+    match holds_robot(&path) || is_path {
         true => path.to_string_lossy().into_owned(),
         false => name.to_string(),
     }

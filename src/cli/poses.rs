@@ -3,6 +3,7 @@
 use super::{Collisions, Folder, pretty, print, warn};
 use clap::ValueEnum;
 use excite::calibrate::{self, Frame, Kind, Tolerances, poses};
+use excite::robot::holds_robot;
 use excite::{Error, Result};
 use nalgebra::Vector3;
 use std::path::PathBuf;
@@ -224,8 +225,8 @@ pub fn run(args: Args) -> Result<()> {
     ];
     if let Some(seed) = args.rehearse {
         let robot = match std::fs::canonicalize(&args.robot) {
-            Ok(path) => path.to_string_lossy().into_owned(),
-            Err(_) => args.robot.clone(),
+            Ok(path) if holds_robot(&path) => path.to_string_lossy().into_owned(),
+            _ => args.robot.clone(),
         };
         let frames = [args.frame.as_deref(), args.other.as_deref()];
         let text = poses::toml(&robot, frames, &request, all[3]);

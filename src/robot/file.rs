@@ -70,6 +70,12 @@ impl Text<'_> {
     }
 }
 
+/// Whether a robot is read from this path: a file, or a folder with a `robot.yaml`. Any other folder does not hide the
+/// bundled robot of its name.
+pub fn holds_robot(path: &Path) -> bool {
+    path.is_file() || path.join("robot.yaml").is_file()
+}
+
 impl Robot {
     /// Reads a robot: the path of a `robot.toml`, a `.urdf`, a `.xacro` or an MJCF, or the name of a bundled robot. A
     /// file of that name wins over a bundled robot. Arguments of a xacro stand behind its path, as in

@@ -21,6 +21,8 @@ pub(crate) mod urdf;
 mod velocity_by_position;
 pub(crate) mod xacro;
 
+#[doc(hidden)]
+pub use file::holds_robot;
 pub use inertia::Inertia;
 #[doc(hidden)]
 pub use meant::Placement;

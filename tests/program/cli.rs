@@ -872,3 +872,33 @@ fn a_new_parallel_robot_has_a_campaign() {
     let t = Test::new();
     t.fails("new hexapod --output robot.toml", 2, &["folder"]);
 }
+
+#[test]
+fn a_folder_of_its_name_does_not_hide_a_bundled_robot() {
+    let test = Test::new();
+    let lines = [
+        "poses h4 --count 20 --rehearse 1 --output h4",
+        "calibrate h4/calibration.toml --output h4/calibrated",
+        "design hexapod --for load --starts 1 --output hexapod",
+    ];
+    for line in lines {
+        let out = test.run(line);
+        assert_eq!(out.status, 0, "{line}\n{}", out.stderr);
+    }
+    for (file, robot) in [
+        ("h4/calibration.toml", "h4"),
+        ("hexapod/experiment.toml", "hexapod"),
+    ] {
+        let text = std::fs::read_to_string(test.path().join(file)).unwrap();
+        let wanted = format!("robot = \"{robot}\"");
+        assert!(text.lines().any(|l| l.trim() == wanted), "{file}:\n{text}");
+    }
+    // nor does a folder beside the file that names the robot
+    let text = std::fs::read_to_string(test.path().join("h4/calibration.toml")).unwrap();
+    let beside = test.file(
+        "beside.toml",
+        text.replace("measured.csv", "h4/measured.csv"),
+    );
+    let out = beside.run("calibrate beside.toml --output beside");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+}

@@ -6,6 +6,7 @@ use excite::design::Settings;
 use excite::design::diagnostic::{Motion, diagnostic_set};
 use excite::identifiability::assess;
 use excite::log::Purpose;
+use excite::robot::holds_robot;
 use excite::trajectory::Trajectory;
 use excite::{Error, Plant, Result};
 use serde_json::{Value, json};
@@ -167,7 +168,7 @@ pub(super) fn robot_from(folder: &Path, spec: &str) -> String {
             .collect()
     };
     let file = Path::new(spec);
-    if !file.exists() {
+    if !holds_robot(file) {
         return spec.to_string();
     }
     let (from, to) = (parts(folder), parts(file));
