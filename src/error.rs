@@ -155,6 +155,8 @@ warning_kinds! {
     ColumnsIgnored = "columns_ignored",
     /// Rows of a log were left out: no, repeated or impossible time stamps, or a line that breaks off.
     RowsLeftOut = "rows_left_out",
+    /// A log is so long that it was read in parts; the message says what comes from all of it, and what does not.
+    ReadInParts = "read_in_parts",
     /// Samples of a channel are missing, stuck or saturated and were left out of the fit.
     SamplesLeftOut = "samples_left_out",
     /// Few samples of a log are sound in all channels.

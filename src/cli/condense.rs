@@ -1,10 +1,11 @@
 //! `excite condense EXPERIMENT`.
 
 use super::{identify::columns, outside, print, warn};
-use excite::identify::{Factor, Settings, condense};
-use excite::log::{Experiment, Purpose, Record};
+use excite::identify::{Settings, condense, condense_parts};
+use excite::log::{Experiment, Outline, Record};
 use excite::output::{prepare_dir, write_atomic};
-use excite::{Error, Plant, Result};
+use excite::survey::check;
+use excite::{Error, Result};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -31,9 +32,8 @@ pub struct Args {
     /// bandwidth of the motion]
     #[arg(long, value_name = "HZ")]
     cutoff: Option<f64>,
-    /// Read a log that is too long for the memory in parts of so many rows, each a record of its own: of a CSV with the
-    /// columns t, q1…, tau1…, with the cut-off that all parts share
-    #[arg(long, value_name = "N", requires_all = ["robot", "cutoff"])]
+    /// Read logs that are too long for the memory in parts of so many rows, each a record of its own
+    #[arg(long, value_name = "N")]
     rows: Option<usize>,
     /// Do not average the periods of motion that repeats
     #[arg(long)]
@@ -69,53 +69,31 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.cutoff = args.cutoff;
     settings.signals.average = !args.no_average;
     settings.signals.measured_rates = !args.derive;
-    let atmosphere = outside(args.atmosphere)?;
     let asked = args.identify.as_deref();
-    let whole = |mut experiment: Experiment| -> Result<Factor> {
-        experiment.press(atmosphere)?;
-        let Experiment {
-            spec,
-            plant,
-            records,
-            ..
-        } = experiment;
-        let mut notes = excite::survey::check(&plant, &records)?;
-        let plant = columns(plant, asked, &mut notes)?;
-        let mut factor = condense(&plant, &spec, asked, &records, &settings)?;
-        factor.header.warnings.splice(0..0, notes);
-        Ok(factor)
-    };
-    let one = |spec: &str, plant: &Plant, record: Record| Experiment {
-        path: args.record.clone(),
-        spec: spec.to_string(),
-        plant: plant.clone(),
-        records: vec![record],
-    };
-    let (path, period) = (&args.record, args.period);
-    let factor = match (&args.robot, args.rows) {
-        (Some(spec), None) => {
-            let plant = Plant::load(spec)?;
-            let record = Record::read(path, &plant, Purpose::Fit, period)?;
-            whole(one(spec, &plant, record))?
+    let outline = match &args.robot {
+        Some(robot) => Outline::of_log(&args.record, robot, args.period)?,
+        None => Outline::read(&args.record)?,
+    }
+    .pressed(outside(args.atmosphere)?);
+    let mut notes = Vec::new();
+    let plant = columns(outline.plant.clone(), asked, &mut notes)?;
+    let mut factor = match args.rows {
+        Some(rows) => {
+            let check = |part: &Record| check(&outline.plant, std::slice::from_ref(part));
+            condense_parts(&outline, &plant, asked, rows, &settings, &check)?.factor
         }
-        (Some(spec), Some(rows)) => {
-            let plant = Plant::load(spec)?;
-            let mut sum: Option<Factor> = None;
-            Record::read_parts(path, &plant, Purpose::Fit, period, rows, &mut |record| {
-                let next = whole(one(spec, &plant, record))?;
-                sum = Some(match sum.take() {
-                    Some(all) => all.and_then(next)?,
-                    None => next,
-                });
-                Ok(())
-            })?;
-            let mut sum = sum.ok_or_else(|| Error::Argument("no part was read".into()))?;
-            let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            sum.header.parts[0].records = vec![name.into_owned()];
-            sum
+        None => {
+            let Experiment {
+                spec,
+                plant: stated,
+                records,
+                ..
+            } = outline.whole()?;
+            notes.splice(0..0, check(&stated, &records)?);
+            condense(&plant, &spec, asked, &records, &settings)?
         }
-        _ => whole(Experiment::read(path)?)?,
     };
+    factor.header.warnings.splice(0..0, notes);
     warn(&factor.header.warnings);
     let bytes = factor.to_bytes()?;
     write_atomic(&output, args.force, |w| w.write_all(&bytes))?;

@@ -3,13 +3,18 @@
 use super::{Folder, into, outside, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
 use excite::identify::page;
-use excite::identify::{Consistency, Identification, Method, Settings, identify, json};
-use excite::log::Experiment;
+use excite::identify::{
+    Consistency, Identification, Method, Settings, identify, identify_parts, json,
+};
+use excite::log::{Outline, Record};
 use excite::robot::JointTerm;
-use excite::{Plant, Result, Warning, WarningKind};
+use excite::{Plant, Result, Warning, WarningKind, survey};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Instant;
+
+/// Rows of a part of a log that is read in parts.
+const PART: usize = 250_000;
 
 /// Identify the model from recorded runs.
 #[derive(clap::Args)]
@@ -68,6 +73,10 @@ pub struct Args {
     /// coulomb and offset where that of a serial one lists none for any joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
+    /// Read the logs in parts of so many rows, and hold no more than one part at a time; 0 reads them whole [default:
+    /// 250000 where a log has more than about a million rows, else 0]
+    #[arg(long, value_name = "N")]
+    rows: Option<usize>,
     /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
     /// relative to it
     #[arg(long, value_name = "PA", default_value_t = 101_325.0)]
@@ -88,14 +97,11 @@ pub(super) fn consistency(name: &str) -> Consistency {
 
 pub fn run(args: Args) -> Result<()> {
     let begin = Instant::now();
-    let mut experiment = Experiment::read(&args.experiment)?;
-    experiment.press(outside(args.atmosphere)?)?;
-    // what only a diagnosis asks for
-    for record in &mut experiment.records {
-        record.written = None;
-    }
-    let mut notes = excite::survey::check(&experiment.plant, &experiment.records)?;
-    experiment.plant = columns(experiment.plant, args.identify.as_deref(), &mut notes)?;
+    let outline = Outline::read(&args.experiment)?.pressed(outside(args.atmosphere)?);
+    let asked = args.identify.as_deref();
+    let mut notes = Vec::new();
+    let plant = columns(outline.plant.clone(), asked, &mut notes)?;
+    let plant = &plant;
     let mut settings = Settings {
         method: match args.method.as_str() {
             "ols" => Method::Ols,
@@ -113,15 +119,32 @@ pub fn run(args: Args) -> Result<()> {
     settings.signals.average = !args.no_average;
     settings.signals.measured_rates = !args.derive;
     let mut names = vec!["model.json", "report.json", "report.html"];
-    names.extend(export::files(&experiment.plant));
-    let further = export::further(&args.also, &experiment.plant)?;
+    names.extend(export::files(plant));
+    let further = export::further(&args.also, plant)?;
     names.extend(further.iter().map(|f| f.file()));
-    let scene = into::planned(&experiment.plant, args.into.as_deref(), &args.output)?;
+    let scene = into::planned(plant, args.into.as_deref(), &args.output)?;
     names.extend(scene.iter().map(String::as_str));
     let folder = Folder::new(&args.output, &names, args.force)?;
 
-    let plant = &experiment.plant;
-    let mut id = identify(plant, &experiment.records, &settings)?;
+    let rows = args.rows.unwrap_or(match outline.is_long() {
+        true => PART,
+        false => 0,
+    });
+    let mut id = match rows {
+        0 => {
+            let mut experiment = outline.whole()?;
+            // what only a diagnosis asks for
+            for record in &mut experiment.records {
+                record.written = None;
+            }
+            notes.splice(0..0, survey::check(&experiment.plant, &experiment.records)?);
+            identify(plant, &experiment.records, &settings)?
+        }
+        rows => {
+            let check = |part: &Record| survey::check(&outline.plant, std::slice::from_ref(part));
+            identify_parts(&outline, plant, asked, rows, &settings, &check)?
+        }
+    };
     id.warnings.splice(0..0, notes);
     let robot = id.robot(plant);
     let model = Model {

@@ -18,10 +18,11 @@ use super::breakaway;
 use super::cross_validation::FOLDS;
 use super::equations::{self, Equations};
 use super::linear;
-use super::method;
+use super::method::{self, Estimate};
 use super::settings::{Method, Settings};
 use super::stack::Stack;
 use super::uncertainty;
+use crate::base::BaseParameters;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Purpose, Record};
 use crate::plant::Plant;
@@ -111,22 +112,54 @@ pub fn condense(
     }
     let records = equations::usable(records, &mut warnings)?;
     let settings = equations::one_filter(&records, settings);
-    let base = plant.base()?;
-    let all = Equations::new(plant, &base, &settings.signals, records)?;
+    of_records(
+        plant,
+        &plant.base()?,
+        spec,
+        asked,
+        records,
+        &settings,
+        warnings,
+    )
+}
+
+/// The same of records without payload, for the fit or not, with a cut-off that is chosen.
+///
+/// # Errors
+/// As [`condense`].
+pub(super) fn of_records(
+    plant: &Plant,
+    base: &BaseParameters,
+    spec: &str,
+    asked: Option<&[String]>,
+    records: Vec<&Record>,
+    settings: &Settings,
+    mut warnings: Vec<Warning>,
+) -> Result<Factor> {
+    let all = Equations::new(plant, base, &settings.signals, records)?;
     warnings.extend(all.prepared.iter().flat_map(|p| p.warnings.clone()));
-    let mut fit = all.fit()?;
-    warnings.extend(fit.unit_suspicions());
-    fit.keep_moving(&mut warnings)?;
-    method::estimate(&mut fit, Method::Wls, &mut warnings)?;
-    let fitted: Vec<Stack> = fit.stacks().into_iter().cloned().collect();
+    let mut fitted: Vec<Stack> = Vec::new();
+    let mut alone = None;
+    if all.records.iter().any(|r| r.purpose == Purpose::Fit) {
+        let mut fit = all.fit()?;
+        warnings.extend(fit.unit_suspicions());
+        fit.keep_moving(&mut warnings)?;
+        let found = method::estimate(&mut fit, Method::Wls, &mut warnings)?;
+        // the estimate from all records is that of the only one
+        alone = (all.records.len() == 1).then_some(found);
+        fitted = fit.into_stacks();
+    }
     let others: Vec<Stack> = all
         .stacks
         .iter()
         .filter(|s| s.purpose != Purpose::Fit)
         .cloned()
         .collect();
-    let (a, folds) = part(&fitted, FOLDS, true)?;
-    let (b, tests) = part(&others, 1, false)?;
+    let (mut a, folds) = part(&fitted, FOLDS)?;
+    for s in &fitted {
+        a.inflated += s.equations() as f64 * inflation(s, alone.take())?;
+    }
+    let (b, tests) = part(&others, 1)?;
     let header = Header {
         robot: spec.into(),
         hash: plant.robot().hash.clone(),
@@ -146,7 +179,7 @@ pub fn condense(
     })
 }
 
-fn part(stacks: &[Stack], folds: usize, fitted: bool) -> Result<(Part, Vec<Mat<f64>>)> {
+fn part(stacks: &[Stack], folds: usize) -> Result<(Part, Vec<Mat<f64>>)> {
     let n = stacks.first().map_or(0, |s| s.actuators);
     let b = stacks.first().map_or(0, |s| s.w.ncols());
     let right: Vec<Vec<f64>> = stacks.iter().map(Stack::tau).collect();
@@ -179,12 +212,6 @@ fn part(stacks: &[Stack], folds: usize, fitted: bool) -> Result<(Part, Vec<Mat<f
         }
         out.push(sum);
     }
-    let mut inflated = 0.0;
-    if fitted {
-        for s in stacks {
-            inflated += s.equations() as f64 * inflation(s)?;
-        }
-    }
     let sums = |f: &dyn Fn(&Stack, usize) -> f64, join: fn(f64, f64) -> f64| -> Vec<f64> {
         let each = |a: usize| stacks.iter().map(|s| f(s, a)).fold(0.0, join);
         (0..n).map(each).collect()
@@ -202,15 +229,18 @@ fn part(stacks: &[Stack], folds: usize, fitted: bool) -> Result<(Part, Vec<Mat<f
         energy: sums(&|s, a| torque(s, a).iter().map(|x| x * x).sum(), |x, y| {
             x + y
         }),
-        inflated,
+        inflated: 0.0,
     };
     Ok((part, out))
 }
 
-/// Variance through correlation in time of a record alone.
-fn inflation(stack: &Stack) -> Result<f64> {
+/// Variance through correlation in time of a record alone, whose estimate may be known.
+fn inflation(stack: &Stack, known: Option<Estimate>) -> Result<f64> {
     let one = [stack];
-    let estimate = method::of_stacks(&one, Method::Wls)?;
+    let estimate = match known {
+        Some(estimate) => estimate,
+        None => method::of_stacks(&one, Method::Wls)?,
+    };
     let factor = linear::factor(&linear::fold_factors(&one, &estimate.weights, 1));
     let r = linear::solve(factor.as_ref())?.r;
     let found = uncertainty::covariance(&one, &estimate.weights, &estimate.pi, r.as_ref())?;

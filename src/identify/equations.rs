@@ -16,6 +16,27 @@ use std::borrow::Cow;
 /// # Errors
 /// A record without torques; no record for the fit.
 pub fn usable<'a>(records: &'a [Record], warnings: &mut Vec<Warning>) -> Result<Vec<&'a Record>> {
+    let used = without_payload(records, warnings)?;
+    match used.iter().any(|r| r.purpose == Purpose::Fit) {
+        true => Ok(used),
+        false => Err(nothing_to_fit()),
+    }
+}
+
+pub(super) fn nothing_to_fit() -> Error {
+    Error::Infeasible(
+        "no record without payload is for the fit (use = \"fit\"): nothing to identify from".into(),
+    )
+}
+
+/// The same, whether a record is for the fit or not.
+///
+/// # Errors
+/// A record without torques.
+pub(super) fn without_payload<'a>(
+    records: &'a [Record],
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<&'a Record>> {
     warnings.extend(records.iter().flat_map(|r| r.warnings.clone()));
     for r in records {
         if r.payload != Payload::None {
@@ -30,17 +51,8 @@ pub fn usable<'a>(records: &'a [Record], warnings: &mut Vec<Warning>) -> Result<
             return Err(Error::file(&r.path, "line 1", message));
         }
     }
-    let used: Vec<&Record> = records
-        .iter()
-        .filter(|r| r.payload == Payload::None)
-        .collect();
-    if !used.iter().any(|r| r.purpose == Purpose::Fit) {
-        return Err(Error::Infeasible(
-            "no record without payload is for the fit (use = \"fit\"): nothing to identify from"
-                .into(),
-        ));
-    }
-    Ok(used)
+    let used = records.iter().filter(|r| r.payload == Payload::None);
+    Ok(used.collect())
 }
 
 /// The settings with the cut-off that all records share, chosen from the fit records where none is given.
@@ -147,6 +159,11 @@ impl Fit<'_> {
     /// The equations, record by record.
     pub fn stacks(&self) -> Vec<&Stack> {
         self.stacks.iter().map(Cow::as_ref).collect()
+    }
+
+    /// The equations themselves.
+    pub fn into_stacks(self) -> Vec<Stack> {
+        self.stacks.into_iter().map(Cow::into_owned).collect()
     }
 
     /// Number of equations that count.

@@ -3,6 +3,7 @@
 use super::breakaway::Breakaway;
 use super::cross_validation::Trial;
 use super::essential::Essential;
+use super::in_parts::Share;
 use super::validation::Validation;
 use crate::base::BaseParameters;
 use crate::error::Warning;
@@ -57,6 +58,8 @@ pub struct Identification {
     pub breakaway: Vec<Breakaway>,
     /// residuals record by record, of the base estimate and of the consistent one
     pub validation: Validation,
+    /// how records were read that came in parts
+    pub in_parts: Vec<Share>,
     /// records as they were used, in the order of the experiment; not serialised
     #[serde(skip)]
     pub prepared: Vec<Prepared>,

@@ -147,6 +147,9 @@ pub fn report(
         "warnings": id.warnings,
         "seconds": seconds,
     });
+    if !id.in_parts.is_empty() {
+        out["read_in_parts"] = json!(id.in_parts);
+    }
     if let Some(scene) = &id.scene {
         out["into"] = json!(scene);
     }

@@ -45,6 +45,8 @@ pub struct Merged {
     pub prior_strength: f64,
     /// how it was chosen
     pub trials: Vec<Trial>,
+    /// smallest over largest eigenvalue of any pseudo-inertia, and the body
+    pub margin: Option<(f64, String)>,
     /// whether every body can exist and no friction or armature is negative
     pub consistent: bool,
     /// essential parameters
@@ -53,6 +55,8 @@ pub struct Merged {
     pub residual_covariance: Mat<f64>,
     /// residuals of the filtered equations: fit and holdout, of the nominal and of this model
     pub errors: [[Option<Errors>; 2]; 2],
+    /// the same of the estimate without prior and consistency, and of the essential parameters
+    pub other_errors: [[Option<Errors>; 2]; 2],
     /// names of the records: fit and holdout
     pub records: [Vec<String>; 2],
     /// everything imperfect
@@ -125,10 +129,14 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
     let essential = essential::reduce(normal.factor.as_ref(), rows as usize, inflation)?;
     let nominal = base.project(&plant.values());
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
-    let errors = [0, 1].map(|p| {
-        let stacks = factor.stacks(p);
-        [&nominal, &found.pi].map(|pi| errors(&stacks, &header.parts[p], pi, &joints))
-    });
+    let errors_of = |models: [&[f64]; 2]| {
+        [0, 1].map(|p| {
+            let stacks = factor.stacks(p);
+            models.map(|pi| errors(&stacks, &header.parts[p], pi, &joints))
+        })
+    };
+    let errors = errors_of([&nominal, &found.pi]);
+    let other_errors = errors_of([&normal.pi, &essential.pi]);
     let of = |k: usize| errors[1][k].as_ref().map(|e: &Errors| e.relative_error);
     if let (Some(before), Some(after)) = (of(0), of(1))
         && after > before
@@ -147,9 +155,11 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
         phi_std: found.std,
         prior_strength: found.strength,
         trials: found.trials,
+        margin: found.margin,
         consistent: found.consistent,
         essential,
         errors,
+        other_errors,
         records: [0, 1].map(|p| header.parts[p].records.clone()),
         warnings,
         base,

@@ -15,7 +15,8 @@
 //! 5. `essential`: the base parameters that matter.
 //! 6. `validation`: residuals on fit and holdout records.
 //!
-//! [`condense`](condense()) reduces records to triangular factors, from which [`merge`](merge()) identifies.
+//! [`condense`](condense()) reduces records to triangular factors, from which [`merge`](merge()) identifies. Logs that
+//! are longer than the memory go that way part by part (`in_parts`).
 
 pub(crate) mod aside;
 mod breakaway;
@@ -27,6 +28,7 @@ pub(crate) mod equations;
 pub(crate) mod essential;
 pub(crate) mod followers;
 pub(crate) mod identification;
+mod in_parts;
 #[doc(hidden)]
 pub mod json;
 pub(crate) mod linear;
@@ -52,6 +54,8 @@ pub use condense::{Factor, condense};
 pub use cross_validation::Trial;
 pub use essential::Essential;
 pub use identification::Identification;
+#[doc(hidden)]
+pub use in_parts::{condense_parts, identify_parts};
 pub use merge::{Merged, merge};
 pub use settings::{Consistency, Method, Settings};
 pub use validation::{Errors, JointError, Validation};
@@ -143,6 +147,7 @@ fn linear_part(plant: &Plant, records: &[Record], settings: &Settings) -> Result
         prepared: equations.prepared,
         essential,
         validation,
+        in_parts: Vec::new(),
         warnings,
         base,
     };

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::log::Purpose;
 use crate::plant::Plant;
 use crate::signals::Prepared;
-use faer::{Mat, MatRef};
+use faer::Mat;
 use rayon::prelude::*;
 
 /// Equations of one record, actuator-major: row `a·count + k`.
@@ -78,7 +78,7 @@ impl Stack {
             .map(|range| {
                 let inputs = p.filter.inputs(range.clone());
                 let part = select(motion, &inputs);
-                let w = plant.regressor(&part)?;
+                let w = plant.regressor_columns(&part)?;
                 let known = plant.known_torque(&part)?;
                 let outputs = range.len();
                 let mut out = Part {
@@ -87,7 +87,7 @@ impl Stack {
                 };
                 let count = inputs.len();
                 for (c, to) in out.w.chunks_exact_mut(n * outputs).enumerate() {
-                    let column = column(w.as_ref(), base.kept[c]);
+                    let column = &w[base.kept[c] * n * count..][..n * count];
                     for a in 0..n {
                         let from = &column[a * count..(a + 1) * count];
                         if from.iter().any(|x| *x != 0.0) {
@@ -176,10 +176,6 @@ impl Stack {
         let pairs = self.measured.iter().zip(predicted);
         pairs.map(|(m, p)| m - p).collect()
     }
-}
-
-fn column(w: MatRef<'_, f64>, c: usize) -> Vec<f64> {
-    (0..w.nrows()).map(|i| w[(i, c)]).collect()
 }
 
 /// The samples of these numbers.

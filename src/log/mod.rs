@@ -23,6 +23,7 @@ pub(crate) mod layout;
 pub(crate) mod merge;
 pub(crate) mod names;
 pub(crate) mod number;
+mod outline;
 mod pose_check;
 pub(crate) mod pressure;
 pub(crate) mod record;
@@ -32,6 +33,8 @@ mod unit;
 mod written;
 
 pub use experiment::Experiment;
+#[doc(hidden)]
+pub use outline::Outline;
 #[doc(hidden)]
 pub use table::Table;
 #[doc(hidden)]

@@ -141,12 +141,16 @@ impl Experiment {
     /// # Errors
     /// Pressures that cannot be in Pa; a robot without piston areas.
     pub fn press(&mut self, atmosphere: f64) -> Result<()> {
-        for record in &mut self.records {
-            check(record, &self.plant, atmosphere)?;
-            if let Some(forces) = record.with_forces(&self.plant, atmosphere)? {
-                *record = forces;
-            }
-        }
-        Ok(())
+        let each = |record| press(record, &self.plant, atmosphere);
+        self.records.iter_mut().try_for_each(each)
     }
+}
+
+/// [`Experiment::press`] of one record.
+pub(crate) fn press(record: &mut Record, plant: &Plant, atmosphere: f64) -> Result<()> {
+    check(record, plant, atmosphere)?;
+    if let Some(forces) = record.with_forces(plant, atmosphere)? {
+        *record = forces;
+    }
+    Ok(())
 }

@@ -24,6 +24,21 @@ impl Plant {
         }
     }
 
+    /// The numbers of [`Plant::regressor`], column by column, without a copy for a tree.
+    ///
+    /// # Errors
+    /// As [`Plant::regressor`].
+    pub(crate) fn regressor_columns(&self, x: &Samples) -> Result<Vec<f64>> {
+        match self.mechanism() {
+            None => Ok(Regressor::with_tree(&self.robot, &self.tree, x).into_columns()),
+            Some(mechanism) => {
+                let w = mechanism.regressor(x)?;
+                let columns = (0..w.ncols()).flat_map(|c| (0..w.nrows()).map(move |i| (i, c)));
+                Ok(columns.map(|at| w[at]).collect())
+            }
+        }
+    }
+
     /// Torque of the nominal model, all terms included, actuator-major, N m or N.
     ///
     /// # Errors

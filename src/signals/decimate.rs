@@ -7,6 +7,7 @@
 //! its outputs only every `factor`-th is computed, and only those whose whole support was measured
 //! count, so that neither ends nor gaps leave a trace.
 
+use super::inner::{AT_ONCE, Inner};
 use std::f64::consts::PI;
 
 /// Low-pass and decimation.
@@ -129,9 +130,10 @@ impl Decimator {
             "lengths of signal and filter"
         );
         let m = self.reach();
+        let inner = Inner::new();
         for (y, &i) in out.iter_mut().zip(&self.at) {
             *y = match i >= m && i + m < x.len() {
-                true => dot(&self.kernel, &x[i - m..=i + m]),
+                true => inner.one(&self.kernel, &x[i - m..=i + m]),
                 // only where the signal repeats
                 false => {
                     let n = x.len();
@@ -170,8 +172,19 @@ impl Decimator {
             return;
         };
         let length = self.kernel.len();
-        for (y, &i) in out.iter_mut().zip(&self.at[range]) {
-            *y = dot(&self.kernel, &x[i - first..i - first + length]);
+        let inner = Inner::new();
+        let part = |i: usize| &x[i - first..i - first + length];
+        let at = self.at[range].chunks(AT_ONCE);
+        for (y, at) in out.chunks_mut(AT_ONCE).zip(at) {
+            match *at {
+                [a, b, c, d] => y.copy_from_slice(
+                    &inner.four(&self.kernel, [part(a), part(b), part(c), part(d)]),
+                ),
+                _ => y
+                    .iter_mut()
+                    .zip(at)
+                    .for_each(|(y, &i)| *y = inner.one(&self.kernel, part(i))),
+            }
         }
     }
 
@@ -189,25 +202,6 @@ impl Decimator {
     pub fn cyclic(&self) -> bool {
         self.cyclic
     }
-}
-
-/// Inner product in eight partial sums, which the compiler puts side by side.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = ca
-        .remainder()
-        .iter()
-        .zip(cb.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in ca.zip(cb) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    let [s0, s1, s2, s3, s4, s5, s6, s7] = sums;
-    rest + ((s0 + s4) + (s1 + s5)) + ((s2 + s6) + (s3 + s7))
 }
 
 /// Half of a Kaiser-windowed sinc with its cut-off at this fraction of the rate.

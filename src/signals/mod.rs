@@ -32,6 +32,7 @@ pub(crate) mod decimate;
 #[doc(hidden)]
 pub mod fourier;
 mod grid;
+mod inner;
 mod prepare;
 pub(crate) mod repeats;
 pub(crate) mod series;

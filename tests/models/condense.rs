@@ -3,10 +3,13 @@
 use crate::common::rehearse;
 use crate::common::shared::shared;
 use excite::Plant;
-use excite::identify::{Factor, Merged, Method, Settings, condense, identify, merge};
-use excite::log::{Experiment, Purpose, Record};
+use excite::identify::{
+    Factor, Merged, Method, Settings, condense, identify, identify_parts, merge,
+};
+use excite::log::{Experiment, Outline, Purpose, Record};
 use excite::robot::JointTerm;
 use excite::simulate::{Effects, Sensors, measure, simulate, to_record};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 fn plant() -> Plant {
@@ -163,7 +166,84 @@ fn a_log_in_parts_is_the_same_log() {
     }
 }
 
-/// Parts of a log with other names, parts of a few rows, and a log in which nothing moves are refused; a part that stands is
+/// An experiment that is read in parts gives what its parts give as records of their own: parameters, spread and errors,
+/// on motion that was fitted and on motion that was not.
+#[test]
+fn an_experiment_in_parts_is_identified_from_all_of_its_rows() {
+    let plant = plant();
+    let folder = tempfile::tempdir().unwrap();
+    let mut toml = String::from("robot = \"planar2\"\n");
+    for (k, run) in records(&plant).iter().enumerate() {
+        let mut text = String::from("t,q1,q2,tau1,tau2\n");
+        for i in 0..run.len() {
+            let [q, tau] = [&run.q, &run.tau];
+            text += &[run.t[i], q[0][i], q[1][i], tau[0][i], tau[1][i]]
+                .map(|x| format!("{x:?}"))
+                .join(",");
+            text.push('\n');
+        }
+        std::fs::write(folder.path().join(format!("{k}.csv")), text).unwrap();
+        let purpose = if k == 2 { "holdout" } else { "fit" };
+        toml += &format!("[[record]]\nlog = \"{k}.csv\"\nuse = \"{purpose}\"\n");
+    }
+    // a record with a load is left out, and said to be
+    toml += "[[record]]\nlog = \"0.csv\"\nuse = \"fit\"\npayload = \"unknown\"\n";
+    let file = folder.path().join("experiment.toml");
+    std::fs::write(&file, toml).unwrap();
+    let outline = Outline::read(&file).unwrap();
+    let rows = 1700;
+    let mut settings = settings(Method::Wls);
+    let none = |_: &Record| Ok(Vec::new());
+    let found = identify_parts(&outline, &plant, None, rows, &settings, &none).unwrap();
+    let mut parts = Vec::new();
+    for k in 0..3 {
+        outline
+            .parts(k, rows, &mut |part| {
+                parts.push(part);
+                Ok(ControlFlow::Continue(()))
+            })
+            .unwrap();
+    }
+    assert!(parts.len() > 5, "{}", parts.len());
+    let whole = identify(&plant, &parts, &settings).unwrap();
+    println!("base parameters off by {:.1e}", off(&found.pi, &whole.pi));
+    assert!(off(&found.pi, &whole.pi) < 1e-10);
+    assert!(off(&found.predicted_std, &whole.predicted_std) < 1e-9);
+    // the variance through correlated residuals is a mean over the parts
+    for (a, b) in found.std.iter().zip(&whole.std) {
+        assert!((a / b - 1.0).abs() < 0.25, "{a} {b}");
+    }
+    let [a, b] = [&found.validation, &whole.validation];
+    let pairs = [(a.plain, b.plain), (a.nominal, b.nominal)];
+    for (x, y) in pairs {
+        assert!((x.0 / y.0 - 1.0).abs() < 1e-6, "{x:?} {y:?}");
+        assert!(
+            (x.1.unwrap() / y.1.unwrap() - 1.0).abs() < 1e-6,
+            "{x:?} {y:?}"
+        );
+    }
+    // the rows of a record are counted, and the loaded one is named
+    let lengths: Vec<usize> = found.in_parts.iter().map(|s| s.rows).collect();
+    assert_eq!(
+        lengths,
+        records(&plant).iter().map(Record::len).collect::<Vec<_>>()
+    );
+    let said = |kind| found.warnings.iter().filter(|w| w.kind == kind).count();
+    assert_eq!(said(excite::WarningKind::ReadInParts), 3);
+    assert_eq!(said(excite::WarningKind::RecordLeftOut), 1);
+
+    // without a cut-off, that of the fastest fit record counts
+    settings.signals.cutoff = None;
+    let chosen = identify_parts(&outline, &plant, None, rows, &settings, &none).unwrap();
+    let fit: Vec<&Record> = parts.iter().filter(|p| p.purpose == Purpose::Fit).collect();
+    let cutoff = excite::signals::common_cutoff([fit[0]]);
+    assert!(chosen.prepared[0].filter.cutoff >= cutoff);
+    settings.method = Method::Robust;
+    let error = identify_parts(&outline, &plant, None, rows, &settings, &none).unwrap_err();
+    assert!(error.to_string().contains("--rows 0"), "{error}");
+}
+
+/// Parts of a log with names that say nothing, parts of a few rows, and a log in which nothing moves are refused; a part that stands is
 /// left out.
 #[test]
 fn what_cannot_be_read_in_parts_is_refused() {

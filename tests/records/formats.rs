@@ -1,7 +1,8 @@
 //! Logs as others write them: every format, every layout, and what an experiment states about columns.
 
 use crate::common::shared::shared;
-use excite::log::{Experiment, Record};
+use excite::Plant;
+use excite::log::{Experiment, Purpose, Record};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -120,6 +121,49 @@ fn bags_are_read_by_the_names_of_the_joints() {
     );
     let e = error(dir.path(), &format!("{two}\nformat = \"mcap\""));
     assert!(e.contains("db3"), "{e}");
+}
+
+/// A log that is read in parts is the same log: no message is lost or comes twice, whatever the format.
+#[test]
+fn bags_and_tables_come_in_parts_as_they_come_whole() {
+    let dir = folder();
+    let plant = Plant::load(dir.path().join("two.urdf").to_str().unwrap()).unwrap();
+    let stored = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/logs");
+    table(
+        dir.path(),
+        "time_ms;q_1;q_0;torque_1;torque_0\n",
+        |t, q, tau| format!("{};{};{};{};{}", 1000.0 * t, q[0], q[1], tau[0], tau[1]),
+    );
+    let bags = ["two.db3", "two_none.mcap", "two_zstd.mcap", "two_lz4.mcap"];
+    let mut paths: Vec<PathBuf> = bags.iter().map(|name| stored.join(name)).collect();
+    paths.push(dir.path().join("log.txt"));
+    for path in paths {
+        let whole = Record::read(&path, &plant, Purpose::Fit, None).unwrap();
+        for rows in [64, 90, 150, 1000] {
+            let mut parts = Vec::new();
+            Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |part| {
+                parts.push(part);
+                Ok(())
+            })
+            .unwrap();
+            let sizes: Vec<usize> = parts.iter().map(Record::len).collect();
+            let what = format!("{} in parts of {rows}: {sizes:?}", path.display());
+            assert_eq!(sizes.iter().sum::<usize>(), whole.len(), "{what}");
+            assert!(
+                sizes
+                    .iter()
+                    .all(|n| 2 * n >= rows.min(whole.len()) && 2 * n < 3 * rows),
+                "{what}"
+            );
+            for j in 0..2 {
+                let channel = |of: fn(&Record) -> &Vec<Vec<f64>>| -> Vec<f64> {
+                    parts.iter().flat_map(|p| of(p)[j].clone()).collect()
+                };
+                assert_eq!(channel(|r| &r.q), whole.q[j], "{what}");
+                assert_eq!(channel(|r| &r.tau), whole.tau[j], "{what}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -13,6 +13,7 @@
 use super::cdr::Cdr;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Table;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// What is known of a message's layout.
@@ -46,17 +47,30 @@ struct Topic {
 }
 
 /// Takes messages and makes the table of one topic.
-pub(super) struct Collector {
+pub(super) struct Collector<'a> {
     wanted: Option<String>,
     topics: Vec<Topic>,
     key: Vec<u8>,
     values: Vec<f64>,
     /// first stamps: what all times are counted from, so that nanoseconds are not lost
     origin: Option<(i64, i64)>,
+    /// whether the stamps of the headers are the times, once that is decided
+    stamped: Option<bool>,
     pub warnings: Vec<Warning>,
+    parts: Option<Parts<'a>>,
 }
 
-impl Collector {
+/// A bag that is handed on in parts.
+struct Parts<'a> {
+    /// messages of one table that are collected before it is handed on
+    rows: usize,
+    /// the fullest table
+    fullest: usize,
+    path: &'a Path,
+    each: &'a mut dyn FnMut(Table, &str) -> Result<ControlFlow<()>>,
+}
+
+impl<'a> Collector<'a> {
     pub fn new(topic: Option<&str>) -> Self {
         Collector {
             wanted: topic.map(String::from),
@@ -64,8 +78,45 @@ impl Collector {
             key: Vec::new(),
             values: Vec::new(),
             origin: None,
+            stamped: None,
             warnings: Vec::new(),
+            parts: None,
         }
+    }
+
+    /// One that hands a table of the messages so far to `each`, with its topic, whenever there are `rows` of them; what
+    /// comes later is of the same topic.
+    pub fn in_parts(
+        topic: Option<&str>,
+        rows: usize,
+        path: &'a Path,
+        each: &'a mut dyn FnMut(Table, &str) -> Result<ControlFlow<()>>,
+    ) -> Self {
+        Collector {
+            parts: Some(Parts {
+                rows,
+                fullest: 0,
+                path,
+                each,
+            }),
+            ..Self::new(topic)
+        }
+    }
+
+    /// Hands a part on where there is one.
+    ///
+    /// # Errors
+    /// As [`Collector::table`]; what the receiver returns.
+    pub fn flush(&mut self) -> Result<ControlFlow<()>> {
+        let Some(mut parts) = self.parts.take_if(|p| p.fullest >= p.rows) else {
+            return Ok(ControlFlow::Continue(()));
+        };
+        let (table, topic) = self.table(parts.path)?;
+        let next = (parts.each)(table, &topic)?;
+        parts.fullest = 0;
+        self.wanted = Some(topic);
+        self.parts = Some(parts);
+        Ok(next)
     }
 
     /// Number of a topic, new or known.
@@ -139,13 +190,35 @@ impl Collector {
             .stamps
             .push(nano.map_or(f64::NAN, |n| seconds(n, first)));
         layout.received.push(seconds(received, begin));
+        if let Some(parts) = &mut self.parts {
+            parts.fullest = parts.fullest.max(layout.received.len());
+        }
         for (column, x) in layout.columns.iter_mut().zip(&self.values) {
             column.push(*x);
         }
     }
 
-    /// The table of the topic that was asked for, or of that with most numbers; and its name.
-    pub fn table(mut self, path: &Path) -> Result<(Table, String)> {
+    /// Hands on what was not yet.
+    ///
+    /// # Errors
+    /// As [`Collector::flush`]; no message at all.
+    pub fn finish(&mut self, path: &Path) -> Result<()> {
+        let any = self.topics.iter().any(|t| !t.layouts.is_empty());
+        if !any {
+            return match self.stamped {
+                Some(_) => Ok(()),
+                None => self.table(path).map(|_| ()),
+            };
+        }
+        if let Some(parts) = &mut self.parts {
+            parts.fullest = parts.rows;
+        }
+        self.flush().map(|_| ())
+    }
+
+    /// The table of the topic that was asked for, or of that with most numbers; and its name. The messages are gone
+    /// then.
+    pub fn table(&mut self, path: &Path) -> Result<(Table, String)> {
         let subject = path.display().to_string();
         for t in &mut self.topics {
             merge(&mut t.layouts);
@@ -201,36 +274,39 @@ impl Collector {
                 ),
             ));
         }
-        let mut topic = self.topics.swap_remove(best);
-        if topic.damaged > 0 {
+        let topic = &mut self.topics[best];
+        let name = topic.name.clone();
+        let mut layouts = std::mem::take(&mut topic.layouts);
+        let damaged = std::mem::take(&mut topic.damaged);
+        self.topics.iter_mut().for_each(|t| t.layouts.clear());
+        if damaged > 0 {
             warnings.push(Warning::new(
                 WarningKind::RowsLeftOut,
                 &subject,
-                format!(
-                    "{} messages of {} are damaged and were left out",
-                    topic.damaged, topic.name
-                ),
+                format!("{damaged} messages of {name} are damaged and were left out"),
             ));
         }
-        for other in topic.layouts.iter().skip(1) {
+        for other in layouts.iter().skip(1) {
             let names: Vec<&str> = other.names.iter().take(4).map(String::as_str).collect();
             warnings.push(Warning::new(
                 WarningKind::RowsLeftOut,
                 &subject,
                 format!(
-                    "{} messages of {} name other joints ({}{}) and were left out",
+                    "{} messages of {name} name other joints ({}{}) and were left out",
                     other.stamps.len(),
-                    topic.name,
                     names.join(", "),
                     if other.names.len() > 4 { ", …" } else { "" }
                 ),
             ));
         }
-        let layout = topic.layouts.swap_remove(0);
+        let layout = layouts.swap_remove(0);
         // the stamps of the headers are when it was measured, unless nobody set them
         let ahead = layout.stamps.windows(2).filter(|w| w[1] > w[0]).count();
-        let set = 10 * ahead >= 9 * layout.stamps.len().saturating_sub(1);
-        if !set {
+        let first = self.stamped.is_none();
+        let set = *self
+            .stamped
+            .get_or_insert(10 * ahead >= 9 * layout.stamps.len().saturating_sub(1));
+        if !set && first {
             warnings.push(Warning::new(
                 WarningKind::TimeRepaired,
                 &subject,
@@ -244,8 +320,30 @@ impl Collector {
         };
         table.names.extend(layout.names);
         table.columns.extend(layout.columns);
-        Ok((table, topic.name))
+        Ok((table, name))
     }
+}
+
+/// Puts a table of the same columns, in any order, behind another.
+pub(super) fn append(all: &mut Table, next: Table, path: &Path) -> Result<()> {
+    if all.names.is_empty() {
+        *all = next;
+        return Ok(());
+    }
+    let at: Option<Vec<usize>> = all.names.iter().map(|n| next.find(n)).collect();
+    let Some(at) = at.filter(|at| at.len() == next.names.len()) else {
+        let message = format!(
+            "its messages name other columns further on ({} instead of {}): cut it there, or name another topic",
+            next.names.join(", "),
+            all.names.join(", ")
+        );
+        return Err(Error::file(path, "", message));
+    };
+    for (column, k) in all.columns.iter_mut().zip(at) {
+        column.extend_from_slice(&next.columns[k]);
+    }
+    all.warnings.extend(next.warnings);
+    Ok(())
 }
 
 /// Joins messages that name the same columns in another order.

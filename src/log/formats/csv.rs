@@ -4,12 +4,14 @@
 //! threads, straight into columns. In memory are the columns and one block, whatever the size of the
 //! file. Lines that are no rows are left out and named.
 
+use super::Each;
 use super::dialect::{Cell, Dialect, canonical, idle, stamp, strip};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Table, number};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Bytes of one block.
@@ -53,17 +55,19 @@ pub(crate) fn read<T>(
     wanted: &dyn Fn(&str) -> bool,
     check: &dyn Fn(&Table) -> Result<T>,
 ) -> Result<(Table, T)> {
-    read_parts(path, wanted, check, usize::MAX, &mut |_| Ok(()))
+    read_parts(path, wanted, check, usize::MAX, &mut |_| {
+        Ok(ControlFlow::Continue(()))
+    })
 }
 
 /// The same, but no more than `rows` and a half of them are held: as many rows are handed to `each` whenever there are
-/// so many, and what is returned are the last, at least half a part.
+/// so many, and what is returned are the last, at least half a part; no rows where `each` said that it has enough.
 pub(crate) fn read_parts<T>(
     path: &Path,
     wanted: &dyn Fn(&str) -> bool,
     check: &dyn Fn(&Table) -> Result<T>,
     rows: usize,
-    each: &mut dyn FnMut(Table) -> Result<()>,
+    each: Each,
 ) -> Result<(Table, T)> {
     let most = rows.saturating_add(rows / 2);
     let mut given = 0;
@@ -76,7 +80,7 @@ pub(crate) fn read_parts<T>(
     let mut layout: Option<(Dialect, Vec<bool>)> = None;
     let mut left = Left::default();
     let mut line = 0;
-    loop {
+    'file: loop {
         let got = file
             .read(&mut block[filled..])
             .map_err(|e| Error::io(path, e))?;
@@ -145,7 +149,10 @@ pub(crate) fn read_parts<T>(
                 let mut part = first_rows(&mut table, rows);
                 without_texts(&mut part, dialect);
                 given += rows;
-                each(part)?;
+                if each(part)?.is_break() {
+                    table.columns.iter_mut().for_each(Vec::clear);
+                    break 'file;
+                }
             }
         }
         block.copy_within(whole..filled, 0);
@@ -190,7 +197,7 @@ pub(crate) fn read_parts<T>(
 }
 
 /// Takes the first rows out of a table; columns that are not kept are empty.
-fn first_rows(table: &mut Table, rows: usize) -> Table {
+pub(super) fn first_rows(table: &mut Table, rows: usize) -> Table {
     let columns = table.columns.iter_mut();
     Table {
         names: table.names.clone(),

@@ -57,13 +57,18 @@ pub(super) fn read(path: &Path, bag: &mut Collector) -> Result<()> {
         at(&message_columns, "timestamp")?,
         at(&message_columns, "data")?,
     );
+    let mut enough = false;
     db.rows(messages, &mut |_, row| {
+        if enough {
+            return Ok(());
+        }
         if let (Some(Value::Integer(topic)), Some(Value::Integer(stamp)), Some(Value::Blob(data))) =
             (row.get(topic), row.get(stamp), row.get(data))
             && let Some(topic) = known.get(topic)
         {
             bag.message(*topic, *stamp, data);
         }
+        enough = bag.flush()?.is_break();
         Ok(())
     })
 }

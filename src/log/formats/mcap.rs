@@ -84,6 +84,9 @@ pub(super) fn read(path: &Path, bag: &mut Collector) -> Result<()> {
             }
             code => take(code, &body, &mut known, bag).ok_or_else(|| broken(at))?,
         }
+        if bag.flush()?.is_break() {
+            return Ok(());
+        }
         at += 9 + length;
     }
 }

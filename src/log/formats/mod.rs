@@ -22,6 +22,7 @@ mod sqlite;
 use super::Table;
 use crate::error::{Error, Result};
 use std::io::Read as _;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Format of a log.
@@ -104,8 +105,11 @@ pub(crate) struct Read {
     pub topic: Option<String>,
 }
 
-/// Reads a file, or a folder that holds a bag.
-pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
+/// What takes the parts of a file; it says whether it wants more.
+pub(crate) type Each<'a> = &'a mut dyn FnMut(Table) -> Result<ControlFlow<()>>;
+
+/// The format of a file, which is that which is stated.
+fn format_of(path: &Path, request: &Request) -> Result<Format> {
     let found = detect(path)?;
     if let Some(stated) = request.format
         && stated != found
@@ -118,6 +122,12 @@ pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
         );
         return Err(Error::file(path, "", message));
     }
+    Ok(found)
+}
+
+/// Reads a file, or a folder that holds a bag.
+pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
+    let found = format_of(path, request)?;
     let plain = |table: Table, format| Read {
         table,
         format,
@@ -126,12 +136,7 @@ pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
     Ok(match found {
         Format::Db3 | Format::Mcap => {
             let mut bag = bag::Collector::new(request.topic);
-            for part in parts(path)? {
-                match detect(&part)? {
-                    Format::Mcap => mcap::read(&part, &mut bag)?,
-                    _ => db3::read(&part, &mut bag)?,
-                }
-            }
+            messages(path, &mut bag)?;
             let (table, topic) = bag.table(path)?;
             Read {
                 table,
@@ -149,6 +154,78 @@ pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
             plain(table, format)
         }
     })
+}
+
+/// Reads the messages of all files of a bag.
+fn messages(path: &Path, bag: &mut bag::Collector) -> Result<()> {
+    for part in parts(path)? {
+        match detect(&part)? {
+            Format::Mcap => mcap::read(&part, bag)?,
+            _ => db3::read(&part, bag)?,
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file can be read in parts: text and bags, no arrays.
+pub(crate) fn divides(path: &Path) -> Result<bool> {
+    let found = detect(path)?;
+    Ok(found.text() || matches!(found, Format::Db3 | Format::Mcap))
+}
+
+/// Reads text or a bag in parts of `rows` rows, and hands each to `each`; the last has half as many at least and up to
+/// half as many again. Files of arrays come as a whole.
+pub(crate) fn read_parts(
+    path: &Path,
+    request: &Request,
+    rows: usize,
+    each: &mut dyn FnMut(Table, Format) -> Result<ControlFlow<()>>,
+) -> Result<()> {
+    let found = format_of(path, request)?;
+    if found.text() {
+        let text = |table: Table, each: &mut dyn FnMut(Table, Format) -> _| {
+            let format = request.format;
+            let format = format.unwrap_or_else(|| Format::of_names(&table.names));
+            each(table, format)
+        };
+        let mut enough = false;
+        let mut one = |table: Table| {
+            let next: Result<ControlFlow<()>> = text(table, each);
+            enough = matches!(next, Ok(ControlFlow::Break(())));
+            next
+        };
+        let (last, ()) = csv::read_parts(path, request.wanted, &|_| Ok(()), rows, &mut one)?;
+        if !enough {
+            let _ = text(last, each)?;
+        }
+        return Ok(());
+    }
+    if !matches!(found, Format::Db3 | Format::Mcap) {
+        let whole = read(path, request)?;
+        let _ = each(whole.table, whole.format)?;
+        return Ok(());
+    }
+    let mut held = Table::default();
+    let mut enough = false;
+    let mut take = |table: Table, _: &str| {
+        bag::append(&mut held, table, path)?;
+        while held.rows() >= rows + rows / 2 && !enough {
+            let mut part = csv::first_rows(&mut held, rows);
+            part.warnings = std::mem::take(&mut held.warnings);
+            enough = each(part, found)?.is_break();
+        }
+        Ok(match enough {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        })
+    };
+    let mut bag = bag::Collector::in_parts(request.topic, (rows / 2).max(1), path, &mut take);
+    messages(path, &mut bag)?;
+    bag.finish(path)?;
+    if !enough {
+        let _ = each(held, found)?;
+    }
+    Ok(())
 }
 
 /// The files of a bag: itself, or those of its folder by name.

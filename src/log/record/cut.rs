@@ -50,6 +50,21 @@ impl Clock {
     }
 }
 
+impl Record {
+    /// The first samples, not more than `count` of them.
+    pub(crate) fn first(&self, count: usize) -> Record {
+        let count = count.min(self.len());
+        let mut out = self.clone();
+        out.t.truncate(count);
+        out.valid.truncate(count);
+        out.written = None;
+        for (_, _, column) in out.channels() {
+            column.truncate(count);
+        }
+        out
+    }
+}
+
 /// Samples of a channel that cannot have been measured: far from everything else, alone or a few in a row.
 pub(crate) fn impossible(y: &[f64]) -> Vec<usize> {
     let mut sorted: Vec<f64> = y.iter().copied().filter(|x| x.is_finite()).collect();

@@ -6,6 +6,7 @@ use crate::log::formats::{self, Format, Request, csv};
 use crate::log::layout::{Layout, Place, Time};
 use crate::log::{Purpose, Record, Table, merge};
 use crate::plant::Plant;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// How a record is read, as an experiment states it.
@@ -69,11 +70,11 @@ impl Record {
 
     /// Reads a log of `plant` in parts of `rows` rows, one after the other, and hands each to `each` as a record of its
     /// own: what is held at a time does not grow with the log. The last part has half as many rows at least, and up to
-    /// half as many again. A part in which no position changes is left out; it is a record without motion.
+    /// half as many again. A part in which no position changes is left out; it is a record without motion. CSV and bags
+    /// are read in parts; arrays (`.npz`, `.mat`) come as a whole.
     ///
     /// # Errors
-    /// As [`Record::read`]; a log that is no CSV with the columns `t`, `q1` … and `tau1` …; fewer than 64 rows a part;
-    /// what `each` returns.
+    /// As [`Record::read`]; fewer than 64 rows a part; what `each` returns.
     pub fn read_parts(
         path: impl AsRef<Path>,
         plant: &Plant,
@@ -82,19 +83,44 @@ impl Record {
         rows: usize,
         each: &mut dyn FnMut(Record) -> Result<()>,
     ) -> Result<()> {
+        let paths = [path.as_ref().to_path_buf()];
+        let reading = Reading::default();
+        Self::parts_as(
+            &paths,
+            plant,
+            purpose,
+            period,
+            &reading,
+            rows,
+            &mut |record| each(record).map(ControlFlow::Continue),
+        )
+    }
+
+    /// The same, as an experiment states it, until `each` has enough. A record from several files, and one of which only
+    /// a part counts, comes as a whole.
+    pub(crate) fn parts_as(
+        paths: &[PathBuf],
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+        reading: &Reading,
+        rows: usize,
+        each: &mut dyn FnMut(Record) -> Result<ControlFlow<()>>,
+    ) -> Result<()> {
         const LEAST: usize = 64;
-        let path = path.as_ref();
         if rows < LEAST {
             let message = format!("parts of {rows} rows are too short; take {LEAST} or more");
             return Err(Error::Argument(message));
         }
-        if !own(&[path.to_path_buf()], &Reading::default())? {
-            let message = "only a CSV with the columns t, q1…, tau1… can be read in parts; read it as a whole";
-            return Err(Error::file(path, "", message));
+        let [path] = paths else {
+            return each(Self::read_as(paths, plant, purpose, period, reading)?).map(|_| ());
+        };
+        if reading.part != [None; 2] || !formats::divides(path)? {
+            return each(Self::read_as(paths, plant, purpose, period, reading)?).map(|_| ());
         }
         let joints = plant.actuators();
-        let (mut parts, mut still, mut used) = (0, 0, 0);
-        let mut take = |table: Table| -> Result<()> {
+        let (mut parts, mut still, mut enough) = (0, 0, false);
+        let mut take = |table: Table| -> Result<ControlFlow<()>> {
             parts += 1;
             let moves = |k: usize| {
                 let column = table.find(&format!("q{}", k + 1));
@@ -102,20 +128,36 @@ impl Record {
             };
             if !(0..joints.len()).any(moves) {
                 still += 1;
-                return Ok(());
+                return Ok(ControlFlow::Continue(()));
             }
-            used += 1;
             let mut record = Self::of_table(table, path, plant, purpose, period, [None; 2])?;
             // what only a diagnosis asks for
             record.written = None;
             record.name = format!("{}[{parts}]", record.name);
-            each(record)
+            let next = each(record)?;
+            enough = next.is_break();
+            Ok(next)
         };
-        let check = |table: &Table| check_names(table, &joints, path);
-        let (mut last, unknown) = csv::read_parts(path, &known, &check, rows, &mut take)?;
-        last.warnings.extend(unknown);
-        take(last)?;
-        if used == 0 {
+        if own(paths, reading)? {
+            let check = |table: &Table| check_names(table, &joints, path);
+            let (mut last, unknown) = csv::read_parts(path, &known, &check, rows, &mut take)?;
+            if !last.columns.iter().all(Vec::is_empty) {
+                last.warnings.extend(unknown);
+                let _ = take(last)?;
+            }
+        } else {
+            let wanted = |name: &str| reading.wants(name);
+            let request = Request {
+                format: reading.format,
+                topic: reading.topic.as_deref(),
+                wanted: &wanted,
+            };
+            let mut layout = None;
+            formats::read_parts(path, &request, rows, &mut |table, format| {
+                take(translate(table, format, plant, reading, &mut layout, path)?)
+            })?;
+        }
+        if !enough && still == parts {
             let message = format!("nothing moves in its {still} parts: no position changes");
             return Err(Error::file(path, "", message));
         }
@@ -153,7 +195,6 @@ fn own(paths: &[PathBuf], reading: &Reading) -> Result<bool> {
 
 /// A table with our names from files with others.
 fn foreign(paths: &[PathBuf], plant: &Plant, reading: &Reading) -> Result<Table> {
-    let joints = plant.actuators();
     let path: &Path = &paths[0];
     let mut parts = Vec::new();
     for path in paths {
@@ -165,14 +206,33 @@ fn foreign(paths: &[PathBuf], plant: &Plant, reading: &Reading) -> Result<Table>
         };
         parts.push((path.clone(), formats::read(path, &request)?));
     }
-    let (mut table, format) = merge::merge(parts)?;
-    let mut layout = match &reading.layout {
-        Some(stated) => stated.clone(),
-        None => Layout::of_names(&table, format, &joints, path)?,
+    let (table, format) = merge::merge(parts)?;
+    translate(table, format, plant, reading, &mut None, path)
+}
+
+/// A table with our names from one with others. Where the quantities stand is found once, and kept in `found`.
+fn translate(
+    mut table: Table,
+    format: Format,
+    plant: &Plant,
+    reading: &Reading,
+    found: &mut Option<Layout>,
+    path: &Path,
+) -> Result<Table> {
+    let joints = plant.actuators();
+    let layout = match found {
+        Some(layout) => layout,
+        None => {
+            let mut layout = match &reading.layout {
+                Some(stated) => stated.clone(),
+                None => Layout::of_names(&table, format, &joints, path)?,
+            };
+            if layout.time.is_none() {
+                layout.time = Layout::time_of(&table, format);
+            }
+            found.insert(layout)
+        }
     };
-    if layout.time.is_none() {
-        layout.time = Layout::time_of(&table, format);
-    }
     let subject = path.display().to_string();
     if layout.currents {
         let message = "the columns of tau are motor currents, whose gains are not stated: tau = { columns = […], unit = \

@@ -1,0 +1,282 @@
+//! Identification from logs that are longer than the memory: read in parts, condensed one after the other.
+//!
+//! ```text
+//! part 1 ─ condense ─▶ R₁ ┐
+//! part 2 ─ condense ─▶ R₂ ┼─ QR ─▶ R ─ merge ─▶ π̂, φ
+//! …                       ┘
+//! ```
+//!
+//! The estimate, its errors and its uncertainty come from all rows. Figures over time, and the search for joints that
+//! move with others, show the first rows of each record.
+
+use super::condense::{Factor, of_records};
+use super::equations::{self, Equations};
+use super::merge::{Merged, merge};
+use super::settings::{Method, Settings};
+use super::validation::{Errors, validate};
+use super::{Identification, doubts, uncertainty};
+use crate::base::BaseParameters;
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::log::{Outline, Payload, Purpose, Record};
+use crate::plant::Plant;
+use crate::signals;
+use std::ops::ControlFlow;
+
+/// Rows that figures show of a record, or two periods where those are more.
+const SHOWN: usize = 60_000;
+/// Most records that figures show.
+const RECORDS: usize = 6;
+
+/// How a record was read.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct Share {
+    /// name of the record
+    pub record: String,
+    /// rows that were used
+    pub rows: usize,
+    /// parts in which they were read
+    pub parts: usize,
+    /// rows that figures show
+    pub shown: usize,
+}
+
+/// Records that were read in parts.
+pub struct Condensed {
+    /// their equations
+    pub factor: Factor,
+    /// the first rows of each record
+    pub shown: Vec<Record>,
+    /// how each was read
+    pub shares: Vec<Share>,
+    /// settings, with the cut-off that all parts share
+    pub settings: Settings,
+}
+
+/// Condenses the records of an experiment, read in parts of `rows` rows; `check` looks at each part.
+///
+/// The cut-off, where none is stated, is chosen from the first part of each fit record in which something moves.
+///
+/// # Errors
+/// As [`Record::read_parts`] and [`condense`](super::condense()).
+pub fn condense_parts(
+    outline: &Outline,
+    plant: &Plant,
+    asked: Option<&[String]>,
+    rows: usize,
+    settings: &Settings,
+    check: &dyn Fn(&Record) -> Result<Vec<Warning>>,
+) -> Result<Condensed> {
+    let purposes = outline.purposes();
+    let settings = one_filter(outline, rows, settings)?;
+    let base = plant.base()?;
+    let mut all: Option<Factor> = None;
+    let (mut shown, mut shares) = (Vec::new(), Vec::new());
+    let mut left_out = Vec::new();
+    for k in 0..purposes.len() {
+        let mut sum: Option<Factor> = None;
+        let mut share: Option<Share> = None;
+        outline.parts(k, rows, &mut |part| {
+            let mut warnings = check(&part)?;
+            let used = equations::without_payload(std::slice::from_ref(&part), &mut warnings)?;
+            if used.is_empty() {
+                left_out.append(&mut warnings);
+                return Ok(ControlFlow::Break(()));
+            }
+            let next = of_records(
+                plant,
+                &base,
+                &outline.spec,
+                asked,
+                used,
+                &settings,
+                warnings,
+            )?;
+            sum = Some(match sum.take() {
+                Some(all) => all.and_then(next)?,
+                None => next,
+            });
+            let share = share.get_or_insert_with(|| {
+                let first = head(&part);
+                let share = Share {
+                    record: first.name.clone(),
+                    rows: 0,
+                    parts: 0,
+                    shown: 0,
+                };
+                if shown.len() < RECORDS {
+                    shown.push(first);
+                }
+                share
+            });
+            share.rows += part.len();
+            share.parts += 1;
+            Ok(ControlFlow::Continue(()))
+        })?;
+        let (Some(mut sum), Some(share)) = (sum, share) else {
+            continue;
+        };
+        for part in sum
+            .header
+            .parts
+            .iter_mut()
+            .filter(|p| !p.records.is_empty())
+        {
+            part.records = vec![share.record.clone()];
+        }
+        shares.push(share);
+        all = Some(match all {
+            Some(all) => all.with(sum)?,
+            None => sum,
+        });
+    }
+    let fitted = all.filter(|f| !f.header.parts[0].records.is_empty());
+    let mut factor = fitted.ok_or_else(equations::nothing_to_fit)?;
+    factor.header.warnings.extend(left_out);
+    for share in &mut shares {
+        let of = shown.iter().find(|r: &&Record| r.name == share.record);
+        share.shown = of.map_or(0, Record::len);
+    }
+    Ok(Condensed {
+        factor,
+        shown,
+        shares,
+        settings,
+    })
+}
+
+/// The cut-off that all parts share.
+fn one_filter(outline: &Outline, rows: usize, settings: &Settings) -> Result<Settings> {
+    let mut settings = settings.clone();
+    if settings.signals.cutoff.is_some() {
+        return Ok(settings);
+    }
+    let mut cutoff = 0.0f64;
+    for (k, purpose) in outline.purposes().into_iter().enumerate() {
+        if purpose == Purpose::Fit {
+            outline.parts(k, rows, &mut |part| {
+                if part.payload == Payload::None {
+                    cutoff = cutoff.max(signals::common_cutoff([&part]));
+                }
+                Ok(ControlFlow::Break(()))
+            })?;
+        }
+    }
+    settings.signals.cutoff = (cutoff > 0.0).then_some(cutoff);
+    Ok(settings)
+}
+
+/// The first rows of a part, under the name of the record.
+fn head(part: &Record) -> Record {
+    let periods = part.periods().map_or(0, |(each, _)| 2 * each);
+    let mut out = part.first(SHOWN.max(periods));
+    if let Some(at) = out.name.rfind('[') {
+        out.name.truncate(at);
+    }
+    out
+}
+
+/// Identifies a plant from the records of an experiment, read in parts of `rows` rows; `check` looks at each part.
+///
+/// # Errors
+/// As [`identify`](super::identify()); a method that needs all samples at once.
+pub fn identify_parts(
+    outline: &Outline,
+    plant: &Plant,
+    asked: Option<&[String]>,
+    rows: usize,
+    settings: &Settings,
+    check: &dyn Fn(&Record) -> Result<Vec<Warning>>,
+) -> Result<Identification> {
+    if !matches!(settings.method, Method::Ols | Method::Wls) {
+        return Err(Error::Argument(
+            "the logs are so long that they are read in parts, for which the methods are ols and wls; --rows 0 reads \
+             them whole"
+                .into(),
+        ));
+    }
+    let Condensed {
+        factor,
+        shown,
+        shares,
+        settings,
+    } = condense_parts(outline, plant, asked, rows, settings, check)?;
+    let merged = merge(plant, vec![factor.clone()], &settings)?;
+    let base = plant.base()?;
+    found(plant, base, &factor, merged, &shown, shares, &settings)
+}
+
+/// The result as of records that were read whole.
+fn found(
+    plant: &Plant,
+    base: BaseParameters,
+    factor: &Factor,
+    merged: Merged,
+    shown: &[Record],
+    shares: Vec<Share>,
+    settings: &Settings,
+) -> Result<Identification> {
+    let equations = Equations::new(plant, &base, &settings.signals, shown.iter().collect())?;
+    let models = [&merged.pi, &merged.pi_consistent, &merged.essential.pi];
+    let mut validation = validate(&equations, models.map(Vec::as_slice))?;
+    let relative = |e: &Option<Errors>| e.as_ref().map(|e| e.relative_error);
+    let both = |all: [&Option<Errors>; 2]| (relative(all[0]).unwrap_or(f64::NAN), relative(all[1]));
+    let [fit, holdout] = &merged.errors;
+    let [plain, essential] = [0, 1].map(|k| [0, 1].map(|p| &merged.other_errors[p][k]));
+    validation.nominal = both([&fit[0], &holdout[0]]);
+    validation.plain = both(plain);
+    validation.essential = both(essential);
+    if let Some(fit) = &fit[1] {
+        validation.fit = fit.clone();
+    }
+    validation.holdout = holdout[1].clone();
+
+    let mut stacks = factor.stacks(0);
+    let one = equations.stacks.iter().find(|s| s.purpose == Purpose::Fit);
+    let stands_for = one.map_or(1.0, |s| s.stands_for);
+    stacks.iter_mut().for_each(|s| s.stands_for = stands_for);
+    let predicted_std = uncertainty::predicted(plant, &stacks.iter().collect::<Vec<_>>())?;
+
+    let mut warnings = merged.warnings;
+    warnings.extend(shares.iter().map(|s| {
+        let message = format!(
+            "{} rows were read in {} parts: parameters and errors are of all of them, figures over time of the first {}",
+            s.rows, s.parts, s.shown
+        );
+        Warning::new(WarningKind::ReadInParts, &s.record, message)
+    }));
+    let mut out = Identification {
+        scene: None,
+        std: merged.std,
+        predicted_std,
+        residual_covariance: merged.residual_covariance,
+        pi: merged.pi,
+        covariance: merged.covariance,
+        inflation: merged.inflation,
+        condition: merged.condition,
+        phi: merged.phi,
+        pi_consistent: merged.pi_consistent,
+        phi_std: merged.phi_std,
+        prior_strength: merged.prior_strength,
+        trials: merged.trials,
+        margin: merged.margin,
+        consistent: merged.consistent,
+        outliers: None,
+        breakaway: Vec::new(),
+        prepared: equations.prepared,
+        essential: merged.essential,
+        validation,
+        in_parts: shares,
+        warnings,
+        base,
+    };
+    // what predicts worse is said of condensed records as well
+    let said = |w: &Warning, all: &[Warning]| {
+        all.iter()
+            .any(|o| o.kind == w.kind && o.subject == w.subject)
+    };
+    let doubts = doubts::doubts(plant, &out);
+    let new = doubts.into_iter().filter(|w| !said(w, &out.warnings));
+    let new: Vec<Warning> = new.collect();
+    out.warnings.extend(new);
+    Ok(out)
+}
