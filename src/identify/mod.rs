@@ -25,6 +25,8 @@ pub(crate) mod cross_validation;
 pub(crate) mod doubts;
 pub(crate) mod equations;
 pub(crate) mod essential;
+pub(crate) mod factor;
+mod factor_file;
 pub(crate) mod followers;
 pub(crate) mod identification;
 #[doc(hidden)]
@@ -48,9 +50,10 @@ pub(crate) mod validation;
 pub(crate) mod weights;
 
 pub use breakaway::Breakaway;
-pub use condense::{Factor, condense};
+pub use condense::condense;
 pub use cross_validation::Trial;
 pub use essential::Essential;
+pub use factor::Factor;
 pub use identification::Identification;
 pub use merge::{Merged, merge};
 pub use settings::{Consistency, Method, Settings};
