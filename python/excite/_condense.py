@@ -17,7 +17,7 @@ from ._robot import PathLike, Robot, _names
 
 
 class Factor:
-    """Condensed records: a megabyte or less in place of a log of any length. It can be pickled."""
+    """Condensed records: about 200 kB for seven joints, in place of a log of any length. It can be pickled."""
 
     def __init__(self, data: bytes) -> None:
         #: what the file holds

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 /// Reduce records to triangular factors, from which merge identifies.
 #[derive(clap::Args)]
 #[command(
-    long_about = "Reduce records to triangular factors that add, from which `excite merge` identifies: a megabyte or less \
-                  in place of a log of any length.\n\nOne file for all records of an experiment, with those for \
+    long_about = "Reduce records to triangular factors that add, from which `excite merge` identifies: about \
+                  200 kB for seven joints, in place of a log of any length.\n\nOne file for all records of an experiment, with those for \
                   the fit and the holdout ones apart. Factors add where robot, columns and cut-off are the same.",
     after_help = "Examples:\n  excite condense experiment.toml --cutoff 20 --output day1.factor\n  excite condense run1.csv \
                   --robot arm.toml --period 10 --cutoff 20\n  excite condense day.csv --robot arm.toml --cutoff 20 \

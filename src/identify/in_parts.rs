@@ -9,8 +9,9 @@
 //! The estimate, its errors and its uncertainty come from all rows. Figures over time, and the search for joints that
 //! move with others, show the first rows of each record.
 
-use super::condense::{Factor, of_records};
+use super::condense::of_records;
 use super::equations::{self, Equations};
+use super::factor::Factor;
 use super::merge::{Merged, merge};
 use super::settings::{Method, Settings};
 use super::validation::{Errors, validate};
@@ -75,7 +76,7 @@ pub fn condense_parts(
     for k in 0..purposes.len() {
         let mut sum: Option<Factor> = None;
         let mut share: Option<Share> = None;
-        outline.parts(k, rows, &mut |part| {
+        each_part(outline, k, rows, &mut |part| {
             let mut warnings = check(&part)?;
             let used = equations::without_payload(std::slice::from_ref(&part), &mut warnings)?;
             if used.is_empty() {
@@ -141,6 +142,37 @@ pub fn condense_parts(
         shown,
         shares,
         settings,
+    })
+}
+
+/// Hands the parts of a record to `each` in their order; the next one is read meanwhile.
+fn each_part(
+    outline: &Outline,
+    record: usize,
+    rows: usize,
+    each: &mut dyn FnMut(Record) -> Result<ControlFlow<()>>,
+) -> Result<()> {
+    std::thread::scope(|scope| {
+        let (send, receive) = std::sync::mpsc::sync_channel(0);
+        let reader = scope.spawn(move || {
+            outline.parts(record, rows, &mut |part| {
+                Ok(match send.send(part) {
+                    Ok(()) => ControlFlow::Continue(()),
+                    // nobody wants more
+                    Err(_) => ControlFlow::Break(()),
+                })
+            })
+        });
+        for part in &receive {
+            if each(part)?.is_break() {
+                break;
+            }
+        }
+        drop(receive);
+        match reader.join() {
+            Ok(read) => read,
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
     })
 }
 
@@ -230,11 +262,10 @@ fn found(
     }
     validation.holdout = holdout[1].clone();
 
-    let mut stacks = factor.stacks(0);
+    let mut all = factor.fitted();
     let one = equations.stacks.iter().find(|s| s.purpose == Purpose::Fit);
-    let stands_for = one.map_or(1.0, |s| s.stands_for);
-    stacks.iter_mut().for_each(|s| s.stands_for = stands_for);
-    let predicted_std = uncertainty::predicted(plant, &stacks.iter().collect::<Vec<_>>())?;
+    all.stands_for = one.map_or(1.0, |s| s.stands_for);
+    let predicted_std = uncertainty::predicted(plant, &[&all])?;
 
     let mut warnings = merged.warnings;
     warnings.extend(shares.iter().map(|s| {

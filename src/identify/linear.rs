@@ -87,6 +87,24 @@ pub fn weighted(
 ) -> Mat<f64> {
     let (n, b, m) = (stack.actuators, stack.w.ncols(), range.len());
     let mut out = Mat::<f64>::zeros(n * m, b + 1);
+    if let Weights::Same(l) = weights {
+        for (a, d) in (0..n).flat_map(|a| (0..n).map(move |d| (a, d))) {
+            let x = l[(a, d)];
+            if x == 0.0 {
+                continue;
+            }
+            let from = d * stack.count + range.start;
+            for c in 0..b {
+                let mut to = out.as_mut().subrows_mut(a * m, m).col_mut(c);
+                let from = stack.w.as_ref().subrows(from, m).col(c);
+                faer::zip!(&mut to, &from).for_each(|faer::unzip!(to, w)| *to += x * *w);
+            }
+            for k in 0..m {
+                out[(a * m + k, b)] += x * tau[from + k];
+            }
+        }
+        return out;
+    }
     for c in 0..=b {
         for (k, s) in range.clone().enumerate() {
             let l = weights.at(record, s);

@@ -1,8 +1,8 @@
 //! The model from condensed records ([`super::condense`]).
 
-use super::condense::{Factor, Part};
 use super::cross_validation::Trial;
 use super::essential::{self, Essential};
+use super::factor::{Factor, Part};
 use super::identification::measured;
 use super::linear::{self, Weights};
 use super::normal::Normal;
@@ -94,8 +94,7 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
     warnings.extend(base.warnings.iter().cloned());
     warnings.extend(header.warnings.iter().cloned());
     let part = &header.parts[0];
-    let stacks = factor.stacks(0);
-    let stacks: Vec<&Stack> = stacks.iter().collect();
+    let fitted = factor.fitted();
     let rows: f64 = part.used.iter().sum();
     if rows < base.count() as f64 {
         return Err(Error::Infeasible(format!(
@@ -103,12 +102,10 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
             base.count()
         )));
     }
-    let (weights, pi) = estimate(&stacks, part, settings.method)?;
-    let folds: Vec<Mat<f64>> = stacks
-        .iter()
-        .map(|s| linear::factor(&linear::fold_factors(&[*s], &weights, 1)))
-        .collect();
-    let whole = linear::factor(&folds);
+    let Estimate { weights, alone, pi } = estimate(&fitted, part, settings.method)?;
+    let of = |s: &Stack, w: &Weights| linear::factor(&linear::fold_factors(&[s], w, 1));
+    let folds = factor.folds(0).iter().map(|s| of(s, &alone)).collect();
+    let whole = of(&fitted, &weights);
     let solution = linear::solve(whole.as_ref())?;
     let inflation = (part.inflated / rows).max(1.0);
     let freedom = rows / (rows - base.count() as f64).max(1.0);
@@ -131,7 +128,10 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
     let errors_of = |models: [&[f64]; 2]| {
         [0, 1].map(|p| {
-            let stacks = factor.stacks(p);
+            let stacks = match p {
+                0 => vec![fitted.clone()],
+                _ => factor.folds(p),
+            };
             models.map(|pi| errors(&stacks, &header.parts[p], pi, &joints))
         })
     };
@@ -144,7 +144,7 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
         warnings.push(doubts::worse_than_nominal(after, before));
     }
     Ok(Merged {
-        residual_covariance: covariance_of(&stacks, part, &normal.pi),
+        residual_covariance: covariance_of(&fitted, part, &normal.pi),
         std: normal.std(),
         pi: normal.pi,
         covariance: normal.covariance,
@@ -167,42 +167,54 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
 }
 
 /// Covariance of the residual between actuators: that of the rows, with the number of equations that they stand for.
-fn covariance_of(stacks: &[&Stack], part: &Part, pi: &[f64]) -> Mat<f64> {
+fn covariance_of(fitted: &Stack, part: &Part, pi: &[f64]) -> Mat<f64> {
     let n = part.used.len();
-    let c = weights::residual_covariance(stacks, pi);
+    let c = weights::residual_covariance(&[fitted], pi);
     let taken = pi.len() as f64 / n.max(1) as f64;
-    let rows: usize = stacks.iter().map(|s| s.count).sum();
-    let had = (rows as f64 - taken).max(1.0);
+    let had = (fitted.count as f64 - taken).max(1.0);
     let freedom = |a: usize| (part.used[a] - taken).max(1.0);
     Mat::from_fn(n, n, |a, b| {
         c[(a, b)] * had / (freedom(a) * freedom(b)).sqrt()
     })
 }
 
+/// Base parameters and what they were weighted with.
+struct Estimate {
+    weights: Weights,
+    /// of each actuator alone, as the folds need them
+    alone: Weights,
+    pi: Vec<f64>,
+}
+
 /// As the estimators of [`super::method`], step by step.
-fn estimate(stacks: &[&Stack], part: &Part, method: Method) -> Result<(Weights, Vec<f64>)> {
+fn estimate(fitted: &Stack, part: &Part, method: Method) -> Result<Estimate> {
     let n = part.used.len();
     let solve = |w: &Weights| -> Result<Vec<f64>> {
-        let parts: Vec<Mat<f64>> = stacks
-            .iter()
-            .map(|s| linear::factor(&linear::fold_factors(&[*s], w, 1)))
-            .collect();
-        Ok(linear::solve(linear::factor(&parts).as_ref())?.pi)
+        let factor = linear::factor(&linear::fold_factors(&[fitted], w, 1));
+        Ok(linear::solve(factor.as_ref())?.pi)
     };
-    let covariance = |pi: &[f64]| weights::least(covariance_of(stacks, part, pi), &part.largest);
+    let covariance = |pi: &[f64]| weights::least(covariance_of(fitted, part, pi), &part.largest);
     let pi = solve(&Weights::diagonal(&vec![1.0; n]))?;
     let c = covariance(&pi);
     if method == Method::Ols {
         let mean = (0..n).map(|a| c[(a, a)]).sum::<f64>() / n.max(1) as f64;
-        return Ok((Weights::diagonal(&vec![mean.sqrt(); n]), pi));
+        let weights = Weights::diagonal(&vec![mean.sqrt(); n]);
+        return Ok(Estimate {
+            alone: weights.clone(),
+            weights,
+            pi,
+        });
     }
-    let mut weights = Weights::diagonal(&linear::deviations(&c));
+    let mut alone = Weights::diagonal(&linear::deviations(&c));
+    let mut weights = alone.clone();
     let mut pi = solve(&weights)?;
     for _ in 0..COVARIANCE_ROUNDS {
-        weights = Weights::covariance(covariance(&pi).as_ref());
+        let c = covariance(&pi);
+        alone = Weights::diagonal(&linear::deviations(&c));
+        weights = Weights::covariance(c.as_ref());
         pi = solve(&weights)?;
     }
-    Ok((weights, pi))
+    Ok(Estimate { weights, alone, pi })
 }
 
 fn errors(stacks: &[Stack], part: &Part, pi: &[f64], joints: &[String]) -> Option<Errors> {

@@ -26,6 +26,8 @@ pub(crate) mod cross_validation;
 pub(crate) mod doubts;
 pub(crate) mod equations;
 pub(crate) mod essential;
+pub(crate) mod factor;
+mod factor_file;
 pub(crate) mod followers;
 pub(crate) mod identification;
 mod in_parts;
@@ -50,9 +52,10 @@ pub(crate) mod validation;
 pub(crate) mod weights;
 
 pub use breakaway::Breakaway;
-pub use condense::{Factor, condense};
+pub use condense::condense;
 pub use cross_validation::Trial;
 pub use essential::Essential;
+pub use factor::Factor;
 pub use identification::Identification;
 #[doc(hidden)]
 pub use in_parts::{condense_parts, identify_parts};

@@ -62,6 +62,18 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
     pairs.map(|(x, y)| (x - y).abs() / size).fold(0.0, f64::max)
 }
 
+/// Positions and torques of a run, with a column that is none of them.
+fn write_csv(path: &Path, run: &Record) {
+    let mut text = String::from("t,q1,q2,tau1,tau2,mode\n");
+    for k in 0..run.len() {
+        let [q, tau] = [&run.q, &run.tau];
+        let numbers = [run.t[k], q[0][k], q[1][k], tau[0][k], tau[1][k]];
+        text += &numbers.map(|x| format!("{x:?}")).join(",");
+        text += ",auto\n";
+    }
+    std::fs::write(path, text).unwrap();
+}
+
 #[test]
 fn merged_factors_give_what_all_records_give() {
     let plant = plant();
@@ -110,6 +122,41 @@ fn merged_factors_give_what_all_records_give() {
     }
 }
 
+/// What a file rounds adds up over as many files as there are records, and stays far below the promise.
+#[test]
+fn many_files_are_as_good_as_one() {
+    let plant = plant();
+    let run = &records(&plant)[0];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("day.csv");
+    write_csv(&path, run);
+    let mut parts = Vec::new();
+    let rows = run.len() / 12;
+    Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |part| {
+        parts.push(part);
+        Ok(())
+    })
+    .unwrap();
+    assert!(parts.len() > 10);
+    let wls = settings(Method::Wls);
+    let whole = identify(&plant, &parts, &wls).unwrap();
+    let factors: Vec<Factor> = parts
+        .iter()
+        .map(|p| of(&plant, std::slice::from_ref(p)))
+        .collect();
+    let found = merged(&plant, &factors.iter().collect::<Vec<_>>(), &wls);
+    println!("base parameters off by {:.1e}", off(&found.pi, &whole.pi));
+    assert!(off(&found.pi, &whole.pi) < 1e-10);
+    // a sum that went through files itself
+    let sum = factors.iter().cloned().reduce(|a, b| {
+        let bytes = a.with(b).unwrap().to_bytes().unwrap();
+        Factor::from_bytes(&bytes, Path::new("sum.factor")).unwrap()
+    });
+    let again = merged(&plant, &[&sum.unwrap()], &wls);
+    assert!(off(&again.pi, &whole.pi) < 1e-10);
+    assert_eq!(again.prior_strength, found.prior_strength);
+}
+
 /// A log that is read in parts is cut between rows, nowhere else, and its parts condensed one by one give what all of them
 /// together give.
 #[test]
@@ -118,14 +165,7 @@ fn a_log_in_parts_is_the_same_log() {
     let run = &records(&plant)[0];
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("day.csv");
-    let mut text = String::from("t,q1,q2,tau1,tau2,mode\n");
-    for k in 0..run.len() {
-        let [q, tau] = [&run.q, &run.tau];
-        let numbers = [run.t[k], q[0][k], q[1][k], tau[0][k], tau[1][k]];
-        text += &numbers.map(|x| format!("{x:?}")).join(",");
-        text += ",auto\n";
-    }
-    std::fs::write(&path, text).unwrap();
+    write_csv(&path, run);
     let whole = Record::read(&path, &plant, Purpose::Fit, None).unwrap();
     let rows = run.len() / 4 + 7;
     let mut parts = Vec::new();
@@ -307,6 +347,9 @@ fn a_real_experiment_as_a_whole() {
     let whole = identify(&e.plant, &e.records, &settings).unwrap();
     let factor = condense(&e.plant, &e.spec, None, &e.records, &settings).unwrap();
     let m = merged(&e.plant, &[&factor], &settings);
+    // six joints, fit and holdout
+    let size = factor.to_bytes().unwrap().len();
+    assert!(size < 160_000, "{size} bytes");
     println!("base parameters off by {:.1e}", off(&m.pi, &whole.pi));
     assert!(off(&m.pi, &whole.pi) < 1e-10);
     let kinds = m.warnings.iter().map(|w| w.kind);
@@ -346,6 +389,16 @@ fn what_does_not_add_or_is_damaged_is_refused() {
     for cut in [0, 5, 40, bytes.len() / 2, bytes.len() - 1] {
         assert!(Factor::from_bytes(&bytes[..cut], file).is_err());
     }
+    let read = |bytes: &[u8]| Factor::from_bytes(bytes, file).unwrap_err().to_string();
+    let error = read(b"excite factor 1\n{}\n");
+    assert!(error.contains("another version"), "{error}");
+    assert!(error.contains("excite condense"), "{error}");
+    assert!(read(b"t,q1,tau1\n").contains("no factor"));
+    // the numbers have a checksum
+    let last = bytes.len() - 30;
+    let mut wrong = bytes.clone();
+    wrong[last] ^= 4;
+    assert!(read(&wrong).contains("damaged"));
     // whatever stands in the header, nothing panics
     for k in (16..bytes.len().min(1500)).step_by(5) {
         let mut wrong = bytes.clone();
