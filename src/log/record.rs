@@ -23,6 +23,19 @@ const GROUPS: [&str; 8] = ["tau", "ddq", "dq", "qref", "ql", "q", "pa", "pb"];
 /// Most samples of the even grid, in rows of the log.
 const MOST: usize = 30;
 
+/// That so few rows are left, and what was left out.
+pub(crate) fn too_few(rows: usize, warnings: &[Warning]) -> String {
+    let mut text = format!("{rows} rows are too few: there must be 8 or more");
+    for w in warnings
+        .iter()
+        .filter(|w| w.kind == WarningKind::RowsLeftOut)
+    {
+        text += "; ";
+        text += &w.message;
+    }
+    text
+}
+
 /// Group and number of a column name: `tau3` is `("tau", 3)`.
 fn numbered(name: &str) -> Option<(&'static str, usize)> {
     let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
@@ -182,7 +195,7 @@ impl Record {
                     table.rows(),
                     clock.t.len()
                 ),
-                false => format!("{} samples are too few", clock.t.len()),
+                false => too_few(clock.t.len(), &warnings),
             };
             return Err(Error::file(path, "", message));
         }

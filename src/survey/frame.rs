@@ -8,10 +8,12 @@ use crate::log::channels;
 use crate::log::clock;
 use crate::log::formats::Format;
 use crate::log::layout::{Layout, Place, Time, time_unit};
-use crate::log::record::impossible;
+use crate::log::record::{impossible, too_few};
 use crate::log::resample::{Order, fill, interpolate};
 use crate::median::median;
 use crate::plant::Plant;
+use rayon::prelude::*;
+use std::collections::VecDeque;
 use std::path::PathBuf;
 
 /// Grid points of a record, in its rows.
@@ -63,7 +65,7 @@ impl Frame {
             w.subject = subject.clone();
         }
         if rows < 8 {
-            return Err(Error::file(&path, "", format!("{rows} rows are too few")));
+            return Err(Error::file(&path, "", too_few(rows, &warnings)));
         }
         let found = match Layout::time_of(&table, format) {
             Some(Time::Column(Place::Number(k), factor)) => Some((k - 1, factor)),
@@ -227,6 +229,7 @@ impl Frame {
                 })
         };
         (0..joints)
+            .into_par_iter()
             .map(|j| {
                 let q = self.channel(claims, Means::Position, j);
                 let (moves, fastest) = match &q {
@@ -279,22 +282,42 @@ pub(super) fn richest(frames: &[Frame]) -> Option<&Frame> {
     frames.iter().max_by(|a, b| worth(a).total_cmp(&worth(b)))
 }
 
+/// Largest less smallest value among the `k` samples to both sides of each.
+fn travel(q: &[f64], k: usize) -> Vec<f64> {
+    // samples that can still be the largest of a window, the largest first, and likewise the smallest
+    let mut ends = [VecDeque::new(), VecDeque::new()];
+    let beyond: [fn(f64, f64) -> bool; 2] = [|a, b| a >= b, |a, b| a <= b];
+    let mut next = 0;
+    let mut out = Vec::with_capacity(q.len());
+    for i in 0..q.len() {
+        while next < (i + k + 1).min(q.len()) {
+            for (end, beyond) in ends.iter_mut().zip(beyond) {
+                while end.back().is_some_and(|&j: &usize| beyond(q[next], q[j])) {
+                    end.pop_back();
+                }
+                if !q[next].is_nan() {
+                    end.push_back(next);
+                }
+            }
+            next += 1;
+        }
+        for end in &mut ends {
+            while end.front().is_some_and(|&j| j + k < i) {
+                end.pop_front();
+            }
+        }
+        let [high, low] = [0, 1].map(|e: usize| ends[e].front().map(|&j| q[j]));
+        out.push(high.zip(low).map_or(f64::NEG_INFINITY, |(a, b)| a - b));
+    }
+    out
+}
+
 /// Whether a joint moves, sample by sample: by more than a hundredth of its usual speed, and by more than the steps of
 /// its encoder.
 fn still_aware(q: &[f64], step: f64) -> Vec<bool> {
     let n = q.len();
     let k = ((0.1 / step) as usize).clamp(2, (n / 4).max(2));
-    let travel: Vec<f64> = (0..n)
-        .map(|i| {
-            let part = &q[i.saturating_sub(k)..(i + k + 1).min(n)];
-            let (a, b) = part
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
-                    (a.min(x), b.max(x))
-                });
-            b - a
-        })
-        .collect();
+    let travel = travel(q, k);
     let largest = travel.iter().copied().fold(0.0, f64::max);
     let noise = median(
         q.windows(2)
@@ -349,4 +372,26 @@ fn even(table: &Table) -> Option<usize> {
         }
     }
     best.map(|(k, _)| k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::travel;
+
+    #[test]
+    fn travel_is_that_of_every_window() {
+        let mut q: Vec<f64> = (0..200).map(|i| ((i * i) as f64 * 0.37).sin()).collect();
+        q[50..60].fill(0.25);
+        q[90] = f64::NAN;
+        for k in [1, 2, 7, 60, 300] {
+            let found = travel(&q, k);
+            for i in 0..q.len() {
+                let part = &q[i.saturating_sub(k)..(i + k + 1).min(q.len())];
+                let high = part.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x));
+                let low = part.iter().fold(f64::INFINITY, |m, x| m.min(*x));
+                assert_eq!(found[i], high - low, "{i} of windows of {k}");
+            }
+        }
+        assert_eq!(travel(&[f64::NAN; 3], 1), [f64::NEG_INFINITY; 3]);
+    }
 }

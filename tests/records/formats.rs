@@ -391,6 +391,23 @@ fn tables_of_any_layout_are_read_by_their_names() {
     }
 }
 
+/// A file that is too short says which rows it was left with, and why.
+#[test]
+fn a_short_file_says_what_was_left_out() {
+    let dir = folder();
+    let path = dir.path().join("log.txt");
+    std::fs::write(&path, "t,q1,q2,tau1,tau2\n0,1,2,3,4\n0.01,1,oops,3,4\n").unwrap();
+    let read = error(dir.path(), "log = \"log.txt\"");
+    let looked = excite::survey::survey(&[path], None)
+        .unwrap_err()
+        .to_string();
+    for said in [read, looked] {
+        for part in ["log.txt", "1 rows are too few", "line 3", "q2", "oops"] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    }
+}
+
 /// The columns of an experiment: by number, with units, signs, gears and delays; parts of a record.
 #[test]
 fn an_experiment_states_its_columns() {
