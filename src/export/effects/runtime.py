@@ -169,17 +169,20 @@ def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
         data.qfrc_inverse[here.dof] -= model.dof_armature[here.dof] * acceleration + damping * rate
         return data.qfrc_inverse
 
+    def inertia():
+        # of the joints without drive, where the model stands
+        out, one, column = np.zeros((len(free), len(free))), np.zeros(model.nv), np.zeros(model.nv)
+        for k, dof in enumerate(free):
+            one[:], one[dof] = 0.0, 1.0
+            mujoco.mj_mulM(model, data, column, one)
+            out[k] = column[free]
+        return out
+
     def pushed(x, v, a, time):
         # acceleration of the joints without drive
         data.qacc[free] = 0.0
         force = forces(x, v, a, time)[free].copy()
-        mass, one = np.zeros((len(free), len(free))), np.zeros(model.nv)
-        for k, dof in enumerate(free):
-            column = np.zeros(model.nv)
-            one[:], one[dof] = 0.0, 1.0
-            mujoco.mj_mulM(model, data, column, one)
-            mass[k] = column[free]
-        return -np.linalg.solve(mass, force)
+        return -np.linalg.solve(inertia(), force)
 
     def rest(i):
         data.qvel[free] = 0.0
@@ -205,14 +208,8 @@ def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
         data.qpos[here.at] = q[0]
         mujoco.mj_forward(model, data)
         damping = model.dof_damping.copy()
-
-        def rate(dof):
-            one, column = np.zeros(model.nv), np.zeros(model.nv)
-            one[dof] = 1.0
-            mujoco.mj_mulM(model, data, column, one)
-            return np.ravel(damping[dof])[0] / max(column[dof], 1e-9)
-
-        least = 15.0 + 2.0 * max(rate(dof) for dof in free)
+        own = zip(free, np.diag(inertia()))
+        least = 15.0 + 2.0 * max(np.ravel(damping[dof])[0] / max(mass, 1e-9) for dof, mass in own)
         model.dof_damping[free] *= -1.0
         near, far = backwards(least), backwards(2.0 * least)
         model.dof_damping[:] = damping

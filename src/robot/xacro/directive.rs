@@ -30,7 +30,7 @@ impl Work {
             }
             "insert_block" => {
                 let name = self.text(wanted(e, "name")?)?.to_string();
-                let scope = self.scopes.depth() - 1;
+                let scope = self.scopes.here();
                 let block = ["**", "*"].iter().find_map(|stars| {
                     match self.scopes.find(&format!("{stars}{name}"), scope) {
                         Some((_, Entry::Block(nodes))) => Some(nodes.clone()),
@@ -45,11 +45,42 @@ impl Work {
                 call.attributes.retain(|(n, _)| n != "macro");
                 self.call(&name, &call)
             }
-            "element" | "attribute" => Err(format!(
-                "xacro:{} is not read; write the element as it is meant",
-                e.name
-            )),
+            "element" => {
+                let name = self.named(wanted(e, "xacro:name")?, "xacro:element")?;
+                let mut one = e.clone();
+                one.attributes.retain(|(n, _)| n != "xacro:name");
+                match name.strip_prefix("xacro:") {
+                    Some(of) => {
+                        one.name = of.to_string();
+                        self.directive(&one)
+                    }
+                    None => {
+                        one.name = name;
+                        Ok(vec![Node::Element(self.plain(&one)?)])
+                    }
+                }
+            }
             name => self.call(name, e),
+        }
+    }
+
+    /// `xacro:attribute`: an attribute of the element that it stands in.
+    pub(super) fn attribute(&mut self, e: &Element) -> Result<(String, String), Wrong> {
+        let name = self.named(wanted(e, "name")?, "xacro:attribute")?;
+        Ok((name, self.text(wanted(e, "value")?)?.to_string()))
+    }
+
+    /// A name of an element or an attribute.
+    fn named(&mut self, text: &str, of: &str) -> Result<String, Wrong> {
+        let name = self.text(text)?.to_string();
+        let able = |c: char| c.is_alphanumeric() || "_-.:".contains(c);
+        let first = name
+            .chars()
+            .next()
+            .is_some_and(|c| c.is_alphabetic() || c == '_');
+        match first && name.chars().all(able) {
+            true => Ok(name),
+            false => Err(format!("`{name}` of {of} is no name that XML has")),
         }
     }
 
@@ -69,12 +100,12 @@ impl Work {
     /// `xacro:property`.
     fn define(&mut self, e: &Element) -> Result<(), Wrong> {
         let name = self.text(wanted(e, "name")?)?.to_string();
-        let here = self.scopes.depth() - 1;
+        let here = self.scopes.here();
         let truth = |text: Option<&str>| text.and_then(|t| Value::literal(t).condition());
         let stated = e.attribute("scope");
         let scope = match stated {
             Some("global") => 0,
-            Some("parent") => here.saturating_sub(1),
+            Some("parent") => self.scopes.caller(),
             Some(other) => {
                 return Err(format!(
                     "a property has no scope `{other}`; use parent or global"
@@ -83,7 +114,7 @@ impl Work {
             None => here,
         };
         if truth(e.attribute("remove")) == Some(true) {
-            self.scopes.remove(scope, &name);
+            self.scopes.remove(&name);
             return Ok(());
         }
         let value = match (e.attribute("default"), e.attribute("value")) {
@@ -118,13 +149,8 @@ impl Work {
         Ok(())
     }
 
-    /// `xacro:include`: the children of the root of another file.
+    /// `xacro:include`: the children of the root of another file, whose properties and macros may have a name space.
     fn include(&mut self, e: &Element) -> Result<Vec<Node>, Wrong> {
-        if e.attribute("ns").is_some() {
-            return Err(
-                "a name space of an included file (ns) is not read; include it without".into(),
-            );
-        }
         let name = self.text(wanted(e, "filename")?)?.to_string();
         let optional = e
             .attribute("optional")
@@ -134,11 +160,20 @@ impl Work {
             Err(_) if optional => return Ok(Vec::new()),
             other => other?,
         };
+        let inside = match e.attribute("ns") {
+            Some(ns) => {
+                let name = self.text(ns)?.to_string();
+                self.scopes.space(&name)
+            }
+            None => self.scopes.here(),
+        };
         let line = self.line;
         self.files.push(path);
         self.line = 1;
         let root = tree::read(&text)?;
+        let before = self.scopes.enter(inside);
         let out = self.nodes(&root.children)?;
+        self.scopes.enter(before);
         self.files.pop();
         self.line = line;
         Ok(out)

@@ -26,35 +26,32 @@ struct Parameter {
     default: Option<String>,
 }
 
-/// `a b:=1 c:=^ d:=^|'x y' *block`.
+/// `a b:=1 c:=^ d:=^|'x y' e:=${2 * b} *block`, with or without spaces around `:=`.
 fn parameters(text: &str) -> Result<Vec<Parameter>, Wrong> {
     let mut out: Vec<Parameter> = Vec::new();
     let mut rest = text.trim_start();
     while !rest.is_empty() {
-        let mut quote = None;
-        let end = rest.find(|c: char| {
-            match quote {
-                Some(q) if c == q => quote = None,
-                None if c == '\'' || c == '"' => quote = Some(c),
-                None if c.is_whitespace() => return true,
-                _ => {}
+        let end = rest.find(|c: char| c.is_whitespace() || c == ':' || c == '=');
+        let (name, behind) = rest.split_at(end.unwrap_or(rest.len()));
+        let behind = behind.trim_start();
+        let stated = behind
+            .strip_prefix(":=")
+            .or_else(|| behind.strip_prefix('='));
+        let (mut forward, mut default) = (None, None);
+        match stated {
+            None => rest = behind,
+            Some(mut value) => {
+                value = value.trim_start();
+                if let Some(after) = value.strip_prefix('^') {
+                    forward = Some(name.to_string());
+                    value = after.strip_prefix('|').unwrap_or(after);
+                }
+                let end = length(value)
+                    .ok_or_else(|| format!("a default in the parameters `{text}` is not closed"))?;
+                default = Some(&value[..end]).filter(|v| !v.is_empty());
+                rest = value[end..].trim_start();
             }
-            false
-        });
-        if quote.is_some() {
-            return Err(format!("a quote in the parameters `{text}` is not closed"));
         }
-        let (word, after) = rest.split_at(end.unwrap_or(rest.len()));
-        rest = after.trim_start();
-        let (name, value) = match word.split_once(":=").or_else(|| word.split_once('=')) {
-            Some((name, value)) => (name, Some(value)),
-            None => (word, None),
-        };
-        let (forward, default) = match value.map(|v| (v, v.strip_prefix('^'))) {
-            None => (None, None),
-            Some((_, Some(after))) => (Some(name.to_string()), after.strip_prefix('|')),
-            Some((v, None)) => (None, Some(v)),
-        };
         let bare = name.trim_start_matches('*');
         if bare.is_empty() || out.iter().any(|p| p.name == name) {
             return Err(format!(
@@ -70,24 +67,50 @@ fn parameters(text: &str) -> Result<Vec<Parameter>, Wrong> {
     Ok(out)
 }
 
+/// Length of a default up to white space, of which quotes and expressions may have some; `None` where they are not closed.
+fn length(text: &str) -> Option<usize> {
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next() {
+        let rest = &text[at..];
+        let close = match c {
+            '\'' | '"' => c,
+            '$' if rest.starts_with("${") => '}',
+            '$' if rest.starts_with("$(") => ')',
+            _ if c.is_whitespace() => break,
+            _ => {
+                at += c.len_utf8();
+                continue;
+            }
+        };
+        at += c.len_utf8() + rest[c.len_utf8()..].find(close)? + close.len_utf8();
+    }
+    Some(at)
+}
+
 impl Work {
     /// `xacro:macro`.
     pub(super) fn learn(&mut self, e: &Element) -> Result<(), Wrong> {
         let name = wanted(e, "name")?;
         let name = name.strip_prefix("xacro:").unwrap_or(name).to_string();
+        if name == "call" || name.contains('.') {
+            return Err(format!(
+                "a macro cannot be called `{name}`: xacro:call and points have a meaning of their own"
+            ));
+        }
         let known = Macro {
             parameters: parameters(e.attribute("params").unwrap_or_default())?,
             body: e.children.clone(),
             file: self.files.last().cloned().unwrap_or_default(),
         };
-        self.macros.insert(name, Rc::new(known));
+        self.scopes.learn(name, Rc::new(known));
         Ok(())
     }
 
     /// A call of a macro.
     pub(super) fn call(&mut self, name: &str, e: &Element) -> Result<Vec<Node>, Wrong> {
-        let Some(called) = self.macros.get(name).cloned() else {
-            let close = did_you_mean(name, self.macros.keys().map(String::as_str));
+        let Some((sees, called)) = self.scopes.called(name) else {
+            let known = self.scopes.names();
+            let close = did_you_mean(name, known.iter().map(String::as_str));
             return Err(format!("there is no macro `{name}`{close}"));
         };
         let mut given: Vec<(String, Entry)> = Vec::new();
@@ -120,7 +143,7 @@ impl Work {
                     })
                 }
                 (Some(outer), default) => {
-                    let scope = self.scopes.depth() - 1;
+                    let scope = self.scopes.here();
                     match (self.property(outer, scope)?, default) {
                         (Some(v), _) => Entry::Value(v),
                         (None, Some(text)) => self.argument_of(text)?,
@@ -146,8 +169,8 @@ impl Work {
                 "the macro `{name}` has no parameter for a block that is given"
             ));
         }
-        self.scopes.open();
-        let scope = self.scopes.depth() - 1;
+        let before = self.scopes.open(sees);
+        let scope = self.scopes.here();
         for (parameter, entry) in given {
             self.scopes.set(scope, &parameter, entry);
         }
@@ -156,7 +179,7 @@ impl Work {
         let out = self.nodes(&called.body)?;
         self.files.pop();
         self.line = line;
-        self.scopes.close();
+        self.scopes.close(before);
         Ok(out)
     }
 

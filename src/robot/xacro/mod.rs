@@ -2,14 +2,14 @@
 //!
 //! The language is that of ROS: properties are evaluated when they are first used, in the scope that they stand in;
 //! macros have scopes of their own, whose outer one is that of the call; `${…}` holds an expression of Python, `$(…)`
-//! an argument, a package or a variable of the environment. What is not here: `xacro:element`, `xacro:attribute`, name
-//! spaces of included files, lambdas and comprehensions; each is refused by name.
+//! an argument, a package or a variable of the environment. What is not here: lambdas and comprehensions; each is refused
+//! by name.
 //!
 //! | module | what |
 //! |---|---|
 //! | `tree` | XML in and out |
-//! | `value`, `python`, `token`, `expression`, `yaml` | values, expressions, values of YAML files |
-//! | `scope`, `text` | properties, `${…}` and `$(…)` in text |
+//! | `value`, `python`, `token`, `parser`, `expression`, `yaml` | values, expressions, values of YAML files |
+//! | `scope`, `text` | properties and name spaces, `${…}` and `$(…)` in text |
 //! | `directive` | elements of xacro |
 //! | `macros` | macros and their parameters |
 
@@ -17,6 +17,7 @@ mod directive;
 mod expression;
 mod macros;
 mod packages;
+mod parser;
 mod python;
 mod scope;
 mod text;
@@ -86,7 +87,6 @@ pub(crate) fn expand(
 ) -> Result<String> {
     let mut work = Work {
         scopes: Scopes::new(),
-        macros: HashMap::new(),
         arguments: arguments.clone(),
         asked: Default::default(),
         files: vec![file.to_path_buf()],
@@ -118,8 +118,7 @@ pub(crate) fn expand(
 
 /// A description that is being expanded.
 struct Work {
-    scopes: Scopes,
-    macros: HashMap<String, std::rc::Rc<Macro>>,
+    scopes: Scopes<std::rc::Rc<Macro>>,
     /// those that were given, then also those with a default
     arguments: BTreeMap<String, String>,
     /// those that the description has
@@ -147,19 +146,21 @@ impl Work {
             let _ = self.argument(e);
             self.depth = 0;
         }
-        self.line = root.line;
-        let mut attributes = Vec::new();
-        for (name, value) in &root.attributes {
-            attributes.push((name.clone(), self.text(value)?.to_string()));
-        }
-        root.attributes = attributes;
-        let children = std::mem::take(&mut root.children);
-        root.children = self.nodes(&children)?;
-        Ok(root)
+        root.xacro = false;
+        self.plain(&root)
     }
 
-    /// Nodes, expanded.
+    /// Nodes, expanded. What `xacro:attribute` states here belongs to no element that stays.
     fn nodes(&mut self, nodes: &[Node]) -> std::result::Result<Vec<Node>, Wrong> {
+        self.nodes_of(nodes, &mut Vec::new())
+    }
+
+    /// Nodes of an element, expanded, and the attributes that they state for it.
+    fn nodes_of(
+        &mut self,
+        nodes: &[Node],
+        attributes: &mut Vec<(String, String)>,
+    ) -> std::result::Result<Vec<Node>, Wrong> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err("macros or included files call themselves without end".into());
@@ -175,7 +176,10 @@ impl Work {
                 Node::Text(_) => out.push(node.clone()),
                 Node::Element(e) if e.xacro => {
                     self.line = e.line;
-                    out.extend(self.directive(e)?);
+                    match e.name.as_str() {
+                        "attribute" => attributes.push(self.attribute(e)?),
+                        _ => out.extend(self.directive(e)?),
+                    }
                 }
                 Node::Element(e) => out.push(Node::Element(self.plain(e)?)),
             }
@@ -190,10 +194,20 @@ impl Work {
         for (name, value) in &e.attributes {
             attributes.push((name.clone(), self.text(value)?.to_string()));
         }
+        let mut stated = Vec::new();
+        let children = self.nodes_of(&e.children, &mut stated)?;
+        for (name, value) in stated {
+            match attributes.iter_mut().find(|(n, _)| *n == name) {
+                Some((_, old)) => *old = value,
+                None => attributes.push((name, value)),
+            }
+        }
         Ok(Element {
+            name: e.name.clone(),
+            xacro: false,
+            line: e.line,
             attributes,
-            children: self.nodes(&e.children)?,
-            ..e.clone()
+            children,
         })
     }
 
@@ -212,3 +226,5 @@ impl Work {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_of_files;

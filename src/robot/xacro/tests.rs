@@ -1,7 +1,6 @@
 //! Descriptions, with what Python and its own xacro make of them; and what is refused.
 
 use super::*;
-use crate::robot::Robot;
 
 fn expanded(text: &str) -> Result<String> {
     expand(text, Path::new("arm.xacro"), &BTreeMap::new())
@@ -56,6 +55,8 @@ fn expressions_are_those_of_python() {
         ("round(2.5) + int(3.9)", "5"),
         ("str(1) + 'x'", "1x"),
         ("math.sqrt(16)", "4.0"),
+        ("2*math.pi == tau", "True"),
+        ("python.len('ab') + python.max(1, 2)", "4"),
         ("None == 0 or 3", "3"),
         ("dict(a=1.5, b='x')['b'] + str(dict(a=1.5).a)", "x1.5"),
         ("len(dict(dict(a=1)))", "1"),
@@ -110,6 +111,61 @@ fn properties_macros_and_conditions() {
 }
 
 #[test]
+fn elements_and_attributes_have_computed_names() {
+    for (inside, wanted) in [
+        (
+            "<xacro:element xacro:name=\"${'a' + 'b'}\" x=\"${1+1}\"><c/></xacro:element>",
+            "<ab x=\"2\"><c/></ab>",
+        ),
+        (
+            "<xacro:element xacro:name=\"t\"><xacro:attribute name=\"a\" value=\"2\"/></xacro:element>",
+            "<t a=\"2\"/>",
+        ),
+        // a name of xacro is an element of xacro
+        (
+            "<xacro:element xacro:name=\"xacro:if\" value=\"1\"><c/></xacro:element>",
+            "<c/>",
+        ),
+        (
+            "<t a=\"1\"><xacro:attribute name=\"a\" value=\"x${2*3}\"/><xacro:attribute name=\"${'z'}\" value=\"q\"/></t>",
+            "<t a=\"x6\" z=\"q\"/>",
+        ),
+        // in a block that is passed on
+        (
+            "<xacro:macro name=\"m\" params=\"*b\"><xacro:insert_block name=\"b\"/></xacro:macro>\
+             <xacro:m><t><xacro:attribute name=\"a\" value=\"2\"/></t></xacro:m>",
+            "<t a=\"2\"/>",
+        ),
+        // xacro:if and macros are elements of their own, which do not stay
+        (
+            "<t><xacro:if value=\"1\"><xacro:attribute name=\"a\" value=\"2\"/><i/></xacro:if></t>",
+            "<t><i/></t>",
+        ),
+    ] {
+        assert_eq!(body(inside), wanted, "{inside}");
+    }
+    let text = "<robot xmlns:xacro=\"http://ros.org/xacro\" name=\"r\"><xacro:attribute name=\"name\" value=\"s\"/></robot>";
+    assert!(expanded(text).unwrap().contains("<robot name=\"s\"/>"));
+}
+
+#[test]
+fn parameters_and_arguments_are_read_as_ros_reads_them() {
+    // spaces around the sign and in expressions; nothing behind the sign is no default
+    let text = "<xacro:macro name=\"m\" params=\"a := 1 b=2 c:=${2 * 3} d:=$(arg n) e:='x y' f\"><x v=\"${a} ${b} ${c} ${d} ${e} ${f}\"/></xacro:macro>\
+                <xacro:arg name=\"n\" default=\"7\"/><xacro:m f=\"8\"/>";
+    assert_eq!(body(text), "<x v=\"1 2 6 7 x y 8\"/>");
+    let said = refused("<xacro:macro name=\"m\" params=\"a:=\"/><xacro:m/>");
+    assert!(said.contains("needs the parameter `a`"), "{said}");
+    // an argument is text
+    let text = "<xacro:arg name=\"n\" default=\"5\"/><x a=\"${xacro.arg('n') == '5'} ${xacro.arg('n') == 5}\"/>";
+    assert_eq!(body(text), "<x a=\"True False\"/>");
+    // a property is removed wherever it is seen
+    let text = "<xacro:property name=\"p\" value=\"1\"/><xacro:macro name=\"m\"><xacro:property name=\"p\" remove=\"true\"/></xacro:macro>\
+                <xacro:m/><xacro:property name=\"p\" default=\"2\"/><x a=\"${p}\"/>";
+    assert_eq!(body(text), "<x a=\"2\"/>");
+}
+
+#[test]
 fn what_cannot_be_expanded_is_said_with_line_and_name() {
     for (inside, wanted) in [
         ("<x a=\"${b}\"/>", "`b` is not defined"),
@@ -143,7 +199,21 @@ fn what_cannot_be_expanded_is_said_with_line_and_name() {
         ("<x a=\"${1/0}\"/>", "division by zero"),
         ("<x a=\"${[x for x in y]}\"/>", "for"),
         ("<x a=\"${'a' * 10**9}\"/>", "too long"),
-        ("<xacro:element xacro:name=\"a\"/>", "not read"),
+        ("<xacro:element xacro:name=\"\"/>", "no name that XML has"),
+        ("<xacro:element name=\"a\"/>", "has no `xacro:name`"),
+        (
+            "<x><xacro:attribute name=\"a b\" value=\"1\"/></x>",
+            "no name that XML has",
+        ),
+        ("<xacro:macro name=\"a.b\"/>", "cannot be called `a.b`"),
+        (
+            "<xacro:macro name=\"m\"><xacro:macro name=\"inner\"/></xacro:macro><xacro:m/><xacro:inner/>",
+            "no macro `inner`",
+        ),
+        (
+            "<xacro:macro name=\"m\" params=\"a:=${1 b\"/>",
+            "not closed",
+        ),
         (
             "<xacro:include filename=\"not_there.xacro\"/>",
             "not_there.xacro",
@@ -165,73 +235,6 @@ fn deep_nesting_is_refused_and_not_overrun() {
     assert!(refused(&text).contains("deeply") || refused(&text).contains("nest"));
     let text = format!("<x a=\"${{{}1}}\"/>", "not ".repeat(100_000));
     assert!(refused(&text).contains("more than"));
-}
-
-const ARM: &str = r#"<?xml version="1.0"?>
-<robot xmlns:xacro="http://wiki.ros.org/xacro" name="$(arg name)">
-  <xacro:arg name="name" default="arm"/>
-  <xacro:arg name="kind" default=""/>
-  <xacro:include filename="$(find demo_description)/urdf/macros.xacro"/>
-  <xacro:limits file="$(find demo_description)/config/$(arg kind)/limits.yaml"/>
-  <link name="base"/>
-  <xacro:cylinder name="link" mass="1.5" radius="0.1" length="0.2"><origin xyz="0 0 ${0.2/2}"/></xacro:cylinder>
-  <joint name="turn" type="revolute"><parent link="base"/><child link="link"/><axis xyz="0 0 1"/>
-    <limit lower="${low}" upper="${high}" velocity="${limits.velocity}" effort="${limits['effort']}"/></joint>
-</robot>
-"#;
-const MACROS: &str = r#"<robot xmlns:xacro="http://wiki.ros.org/xacro">
-  <xacro:macro name="limits" params="file">
-    <xacro:property name="config" value="${xacro.load_yaml(file)}"/>
-    <xacro:property name="limits" value="${config['joint_limits']['turn']}" scope="parent"/>
-    <xacro:property name="low" value="${config['joint_limits']['turn']['low']}" scope="parent"/>
-    <xacro:property name="high" value="${config['joint_limits']['turn']['high']}" scope="parent"/>
-  </xacro:macro>
-  <xacro:macro name="cylinder" params="name mass radius length *origin">
-    <link name="${name}"><inertial><mass value="${mass}"/><xacro:insert_block name="origin"/>
-      <inertia ixx="${1./12 * mass * (3 * radius**2 + length**2)}" iyy="${1./12 * mass * (3 * radius**2 + length**2)}"
-        izz="${mass * radius * radius / 2}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  </xacro:macro>
-</robot>
-"#;
-const LIMITS: &str = "joint_limits:\n  turn: {low: !degrees -90.0, high: !degrees 180.0, velocity: 2.5, effort: 1.2e2}\n";
-
-#[test]
-fn a_description_of_several_files_is_a_robot() {
-    let folder = tempfile::tempdir().unwrap();
-    let package = folder.path().join("demo_description");
-    for (name, text) in [
-        (
-            "package.xml",
-            "<package><name>demo_description</name></package>",
-        ),
-        ("urdf/arm.urdf.xacro", ARM),
-        ("urdf/macros.xacro", MACROS),
-        ("config/small/limits.yaml", LIMITS),
-        ("robot.toml", "urdf = \"urdf/arm.urdf.xacro kind:=small\"\n"),
-    ] {
-        let path = package.join(name);
-        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-        std::fs::write(path, text).unwrap();
-    }
-    let file = package.join("urdf/arm.urdf.xacro");
-    let file = file.to_str().unwrap();
-    let robot = Robot::load(&format!("{file} kind:=small name:=one")).unwrap();
-    assert_eq!(robot.name, "one");
-    assert_eq!(robot.bodies[0].inertia.mass(), 1.5);
-    let [low, high] = robot.joints[0].limits.position;
-    assert!((low + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
-    assert!((high - std::f64::consts::PI).abs() < 1e-12);
-    assert_eq!(robot.joints[0].limits.effort, 120.0);
-    let other = Robot::load(package.join("robot.toml").to_str().unwrap()).unwrap();
-    assert_eq!(other.joints[0].limits.velocity, 2.5);
-    let said = Robot::load(&format!("{file} kinds:=small"))
-        .unwrap_err()
-        .to_string();
-    assert!(said.contains("limits.yaml"), "{said}");
-    let said = Robot::load(&format!("{file} kind:=small nam:=x"))
-        .unwrap_err()
-        .to_string();
-    assert!(said.contains("did you mean `name`"), "{said}");
 }
 
 #[test]

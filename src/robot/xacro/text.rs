@@ -9,7 +9,7 @@ use std::rc::Rc;
 impl Work {
     /// Text with what stands in it, seen from the innermost scope: a value where it is one expression alone.
     pub(super) fn text(&mut self, text: &str) -> Result<Value, Wrong> {
-        self.text_in(text, self.scopes.depth() - 1)
+        self.text_in(text, self.scopes.here())
     }
 
     pub(super) fn text_in(&mut self, text: &str, scope: usize) -> Result<Value, Wrong> {
@@ -146,6 +146,7 @@ impl Work {
         };
         match entry {
             Entry::Value(v) => Ok(Some(v.clone())),
+            Entry::Space(of) => Ok(Some(Value::Space(*of))),
             Entry::Busy => Err(format!("the property `{name}` needs itself")),
             Entry::Block(_) => Err(format!(
                 "the property `{name}` holds elements; use xacro:insert_block"
@@ -175,6 +176,10 @@ impl Names for Seen<'_> {
         self.work.property(name, self.scope)
     }
 
+    fn inside(&mut self, space: usize, name: &str) -> Result<Option<Value>, String> {
+        self.work.property(name, space)
+    }
+
     fn function(&mut self, name: &str, args: &[Value]) -> Result<Option<Value>, String> {
         let one = args.first().map(Value::to_string).unwrap_or_default();
         Ok(Some(match name {
@@ -188,8 +193,8 @@ impl Names for Seen<'_> {
                 path.display().to_string().as_str().into()
             }
             "arg" => {
-                let value = self.work.substitution(&format!("arg {one}"), self.scope)?;
-                Value::literal(&value.to_string())
+                // text, whatever it looks like
+                self.work.substitution(&format!("arg {one}"), self.scope)?
             }
             "dotify" => args.first().cloned().unwrap_or(Value::Dict(Rc::default())),
             // said to whoever expands it by hand

@@ -65,7 +65,15 @@ pub(super) fn of_xacro(namespace: Option<&str>) -> bool {
 
 fn element(node: Xml, lines: &[usize]) -> Element {
     let xacro = of_xacro(node.tag_name().namespace());
-    let attributes = node.attributes().filter(|a| !of_xacro(a.namespace()));
+    // of xacro's own attributes one has a meaning: the name that an element gets
+    let named = xacro && node.tag_name().name() == "element";
+    let attributes = node.attributes().filter_map(|a| {
+        let name = match of_xacro(a.namespace()) {
+            true => (named && a.name() == "name").then(|| "xacro:name".to_string())?,
+            false => a.name().to_string(),
+        };
+        Some((name, a.value().to_string()))
+    });
     let children = node
         .children()
         .filter_map(|c| match (c.is_element(), c.is_text()) {
@@ -77,9 +85,7 @@ fn element(node: Xml, lines: &[usize]) -> Element {
         name: node.tag_name().name().to_string(),
         xacro,
         line: 1 + lines.partition_point(|at| *at < node.range().start),
-        attributes: attributes
-            .map(|a| (a.name().to_string(), a.value().to_string()))
-            .collect(),
+        attributes: attributes.collect(),
         children: children.collect(),
     }
 }

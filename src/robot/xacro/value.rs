@@ -12,6 +12,8 @@ pub(super) enum Value {
     Text(Rc<str>),
     List(Rc<Vec<Value>>),
     Dict(Rc<Vec<(Value, Value)>>),
+    /// the name space of an included file, by number
+    Space(usize),
 }
 
 impl From<&str> for Value {
@@ -33,6 +35,7 @@ impl std::fmt::Display for Value {
             Value::Int(i) => write!(f, "{i}"),
             Value::Float(x) => write!(f, "{x:?}"),
             Value::Text(t) => f.write_str(t),
+            Value::Space(_) => f.write_str("(a name space)"),
             Value::List(all) => {
                 let all: Vec<String> = all.iter().map(inner).collect();
                 write!(f, "[{}]", all.join(", "))
@@ -80,6 +83,7 @@ impl Value {
             Value::Text(t) => !t.is_empty(),
             Value::List(all) => !all.is_empty(),
             Value::Dict(all) => !all.is_empty(),
+            Value::Space(_) => true,
         }
     }
 
@@ -113,6 +117,7 @@ impl Value {
             Value::Text(_) => "text",
             Value::List(_) => "a list",
             Value::Dict(_) => "a dictionary",
+            Value::Space(_) => "the name space of a file",
         }
     }
 
