@@ -1,6 +1,7 @@
 //! What a leg asks of the actuators, sampled: torques and their rates, the speed of the tool point, and of closed chains the motion of the actuators
 //! and the limits of the pose.
 
+use super::bound::{Bounds, bounds};
 use super::leg::Leg;
 use super::tool::ToolPeak;
 use crate::dynamics::Samples;
@@ -36,6 +37,10 @@ pub struct TorquePeak {
     pub rate: Option<f64>,
     /// share of the limit of the rate
     pub rate_used: Option<f64>,
+    /// the torque exceeds this at no time; `None` where it is only sampled or has no limit
+    pub bound: Option<f64>,
+    /// the rate exceeds this at no time; `None` where it is only sampled or has no limit
+    pub rate_bound: Option<f64>,
 }
 
 /// The limit that is used most.
@@ -202,6 +207,82 @@ fn most(plant: &Plant, x: &Samples, step: f64, share: f64) -> Result<Most> {
 /// Otherwise the limit that no slowness keeps, because the postures alone exceed it. A leg that may not
 /// be slowed (its ends move) is taken as it is or not at all.
 pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
+    let mut leg = match sampled(plant, leg)? {
+        Ok(leg) => leg,
+        Err(most) => return Ok(Err(most)),
+    };
+    // a hundredth at a time, then faster: near a limit at rest the bounds shrink slowly
+    let mut factor = 1.01;
+    for tried in 0.. {
+        let Some(found) = bounds(plant, &leg)? else {
+            break;
+        };
+        let most = bounded(plant, &found);
+        if most.kept() {
+            break;
+        }
+        if !leg.resting || leg.slowed > SLOWEST {
+            return Ok(Err(most));
+        }
+        if tried >= AGAIN {
+            factor = 2.0;
+        }
+        leg = leg.stretched(factor);
+    }
+    Ok(Ok(leg))
+}
+
+/// The limit that bounds use most.
+fn bounded(plant: &Plant, found: &Bounds) -> Most {
+    let mut out = Most {
+        used: 0.0,
+        what: String::new(),
+    };
+    let each = plant
+        .actuators()
+        .into_iter()
+        .zip(&found.torque)
+        .zip(&found.rate);
+    for ((joint, torque), rate) in each {
+        let (effort, fastest) = (joint.limits.effort, joint.limits.effort_rate);
+        out.offer(torque / effort, || {
+            format!("torque of {}: up to {torque:.4} of {effort:.4}", joint.name)
+        });
+        out.offer(rate / fastest, || {
+            format!(
+                "rate of torque of {}: up to {rate:.4} of {fastest:.4}",
+                joint.name
+            )
+        });
+    }
+    if let Some(tool) = &plant.robot().tool {
+        let both = [("speed", tool.speed), ("acceleration", tool.acceleration)];
+        for ((what, limit), bound) in both.into_iter().zip(found.tool) {
+            out.offer(bound / limit, || {
+                format!(
+                    "{what} of the tool point {}: up to {bound:.4} of {limit:.4}",
+                    tool.frame
+                )
+            });
+        }
+    }
+    out
+}
+
+/// What all legs exceed at no time; `None` where that is only sampled.
+fn all_bounds(plant: &Plant, legs: &[Leg]) -> Result<Option<Bounds>> {
+    let mut out: Option<Bounds> = None;
+    for leg in legs {
+        let own = bounds(plant, leg)?;
+        out = match (out, own) {
+            (Some(all), Some(own)) => Some(all.or(&own)),
+            (all, own) => all.or(own),
+        };
+    }
+    Ok(out)
+}
+
+fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     let ((x, step), may_slow) = (samples(leg), leg.resting);
     let share = if may_slow { leg.scale } else { 1.0 };
     let slow = |f: f64| most(plant, &slower(&x, f), f * step, share);
@@ -237,11 +318,19 @@ pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Mos
 }
 
 /// Largest speed and acceleration of the tool point of all legs.
-pub fn tool(plant: &Plant, legs: &[Leg]) -> Option<ToolPeak> {
+pub fn tool(plant: &Plant, legs: &[Leg]) -> Result<Option<ToolPeak>> {
     let each = legs
         .iter()
         .filter_map(|leg| ToolPeak::of(plant, &samples(leg).0));
-    each.reduce(|a, b| a.or(&b))
+    let Some(mut most) = each.reduce(|a, b| a.or(&b)) else {
+        return Ok(None);
+    };
+    if let Some(found) = all_bounds(plant, legs)? {
+        let [speed, acceleration] = found.tool;
+        most.speed_bound = most.speed_used.map(|_| speed);
+        most.acceleration_bound = most.acceleration_used.map(|_| acceleration);
+    }
+    Ok(Some(most))
 }
 
 /// Largest torques of all legs.
@@ -253,9 +342,10 @@ pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
         let (x, step) = samples(leg);
         torques(plant, &x, step, &mut most, &mut rates)?;
     }
-    let each = joints.iter().zip(most).zip(rates);
+    let found = all_bounds(plant, legs)?;
+    let each = joints.iter().zip(most).zip(rates).enumerate();
     Ok(each
-        .map(|((joint, value), rate)| {
+        .map(|(a, ((joint, value), rate))| {
             let fastest = joint.limits.effort_rate;
             let rate = fastest.is_finite().then_some(rate);
             let limit = joint.limits.effort;
@@ -267,6 +357,8 @@ pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
                 used: limit.map(|l| value / l),
                 rate,
                 rate_used: rate.map(|r| r / fastest),
+                bound: limit.and(found.as_ref()).map(|b| b.torque[a]),
+                rate_bound: rate.and(found.as_ref()).map(|b| b.rate[a]),
             }
         })
         .collect())

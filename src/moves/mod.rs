@@ -16,10 +16,12 @@
 //! | `guard` | whether a path is free, proven |
 //! | `planner` | a way round what is in the way |
 //! | `plan` | all of it together |
+//! | `bound` | torques, their rates and the tool point between samples |
 //! | `load` | torques and their rates along a leg, sampled |
 //! | `tool` | speed of the tool point, sampled |
 //! | `rehearsal` | a motion at several speeds: torques, power, samples, bytes |
 
+mod bound;
 mod guard;
 mod leg;
 mod limits;
@@ -148,9 +150,9 @@ pub struct Move {
     pub via: Vec<Vec<f64>>,
     /// the coordinates, all limits of which hold for all time
     pub joints: Vec<JointPeaks>,
-    /// largest torque of each actuator, sampled
+    /// largest torque of each actuator at a sample, and its bound
     pub torques: Vec<TorquePeak>,
-    /// largest speed and acceleration of the tool point, sampled; `None` where it has no limits
+    /// largest speed and acceleration of the tool point at a sample, and their bounds; `None` without limits
     pub tool: Option<ToolPeak>,
     /// how much slower the slowest leg is for the sake of torques and their rates, of velocities by position and
     /// of the tool point; 1: not slower
@@ -170,7 +172,7 @@ pub struct Move {
 impl Move {
     /// The fastest move from one state to another within a share of the limits of velocity,
     /// acceleration and jerk, within the limits of position and torque, and, with a scene, free of
-    /// collisions: all proven for all time but the torques, which are sampled.
+    /// collisions: for all time, but torques of parallel robots, which are sampled.
     ///
     /// ```
     /// use excite::Plant;

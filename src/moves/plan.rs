@@ -371,7 +371,7 @@ impl Planner<'_> {
             via: via.collect(),
             joints: joints.collect(),
             torques: peaks(self.plant, &whole)?,
-            tool: tool(self.plant, &whole),
+            tool: tool(self.plant, &whole)?,
             slowed: whole.iter().map(|leg| leg.slowed).fold(1.0, f64::max),
             scale: whole.iter().map(|leg| leg.scale).fold(0.0, f64::max),
             clearance: None,

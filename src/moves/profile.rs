@@ -164,7 +164,7 @@ impl Profile {
     }
 
     /// Least and largest velocity over `[from, to]`.
-    fn velocities(&self, from: f64, to: f64) -> [f64; 2] {
+    pub fn velocities(&self, from: f64, to: f64) -> [f64; 2] {
         let mut out = [f64::INFINITY, f64::NEG_INFINITY];
         self.within(from, to, |p, low, high| {
             let top = -p.state[2] / p.jerk;
@@ -181,6 +181,28 @@ impl Profile {
     pub fn speed(&self, from: f64, to: f64) -> f64 {
         let [low, high] = self.velocities(from, to);
         high.max(-low).max(0.0)
+    }
+
+    /// Instants at which the jerk may jump, both ends included.
+    pub fn breaks(&self) -> impl Iterator<Item = f64> + '_ {
+        let ends = self.pieces.iter().map(|p| p.start + p.length);
+        self.pieces.iter().map(|p| p.start).chain(ends)
+    }
+
+    /// Largest magnitudes of the position and its five derivatives over `[from, to]`, where the jerk is constant.
+    pub fn jet(&self, from: f64, to: f64) -> [f64; 6] {
+        let mut out = [0.0; 6];
+        self.within(from, to, |p, low, high| {
+            // pieces that the interval only touches
+            if high - low > 1e-9 * (to - from) {
+                let ends = [p.at(low)[2], p.at(high)[2]];
+                out[2] = ends.into_iter().fold(out[2], |m: f64, a| m.max(a.abs()));
+                out[3] = out[3].max(p.jerk.abs());
+            }
+        });
+        let [low, high] = self.range(from, to);
+        [out[0], out[1]] = [low.abs().max(high.abs()), self.speed(from, to)];
+        out
     }
 
     /// What the share of a velocity by position exceeds at no time: intervals whose bound, the largest

@@ -18,6 +18,12 @@ pub struct ToolPeak {
     pub acceleration: f64,
     /// share of its limit; `None` where none is stated
     pub acceleration_used: Option<f64>,
+    /// the speed exceeds this at no time; `None` where it is only sampled
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speed_bound: Option<f64>,
+    /// the acceleration exceeds this at no time; `None` where it is only sampled
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration_bound: Option<f64>,
 }
 
 impl ToolPeak {
@@ -49,6 +55,8 @@ impl ToolPeak {
             speed_used: share(most[0], tool.speed),
             acceleration: most[1],
             acceleration_used: share(most[1], tool.acceleration),
+            speed_bound: None,
+            acceleration_bound: None,
         })
     }
 

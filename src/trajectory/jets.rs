@@ -279,7 +279,7 @@ impl Norms {
 /// Jet of a point in base axes: it lies `reach` from the origin of the last of the bodies of `chain`, which leads
 /// there from the base. Entries are bounds of the position's derivatives, where `coordinates` are those of the
 /// interval of time in question.
-pub(super) fn point_jet(robot: &Robot, chain: &[usize], reach: f64, coordinates: &[Jet]) -> Jet {
+pub(crate) fn point_jet(robot: &Robot, chain: &[usize], reach: f64, coordinates: &[Jet]) -> Jet {
     let (mut nu, mut unit, mut s) = (ZERO, constant(1.0), ZERO);
     for &b in chain {
         let body = &robot.bodies[b];

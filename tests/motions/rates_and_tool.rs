@@ -3,10 +3,15 @@
 use super::controller_limits::{URDF, one_start};
 use excite::Plant;
 use excite::collision::scene::poses;
+use excite::dynamics::Samples;
 use excite::moves::{Move, Settings as MoveSettings, State};
+use excite::regressor::term_factor;
+use excite::robot::JointTerm;
 use excite::robot::{Robot, Tool};
 use excite::trajectory::{Fourier, SampledBound, Series, rate_certificate};
 use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Rates of the smooth torque at many times are inside the bound, whatever is spent on it.
 #[test]
@@ -212,4 +217,109 @@ fn files_state_the_tool_point() {
         let e = read(table).unwrap_err();
         assert!(words.iter().all(|w| e.contains(w)), "{e}");
     }
+}
+
+/// Torques, their rates and the tool point of random legs at 100 kHz: within the limits, and below what the move
+/// says is exceeded at no time.
+#[test]
+fn moves_keep_their_limits_between_samples() {
+    let mut rng = ChaCha8Rng::seed_from_u64(23);
+    let mut slowed = 0;
+    for name in ["panda", "ur5e", "scara", "planar2"] {
+        let mut robot = Robot::load(name).unwrap();
+        let n = robot.dof();
+        let tool = |speed, acceleration| Tool {
+            frame: "tip".into(),
+            body: n - 1,
+            point: Vector3::new(0.3, 0.05, -0.1),
+            speed,
+            acceleration,
+        };
+        robot.tool = Some(tool(1e6, 1e6));
+        robot.joints.iter_mut().for_each(|j| {
+            j.limits.effort = 1e6;
+            j.limits.effort_rate = 1e9;
+        });
+        let mut posture = || -> Vec<f64> {
+            let each = robot.joints.iter().map(|j| {
+                let [low, high] = j.limits.position.map(|x| x.clamp(-1.0, 1.0));
+                rng.random_range(low..=high)
+            });
+            each.collect()
+        };
+        let (from, to) = (State::rest(&posture()), State::rest(&posture()));
+        let settings = MoveSettings::default().with(|set| set.scale = 1.0);
+        let free = Move::plan(&Plant::from(&robot), &from, &to, &settings, None).unwrap();
+        let peak = free.tool.clone().unwrap();
+        robot.tool = Some(tool(0.9 * peak.speed, 0.9 * peak.acceleration));
+        for (joint, peak) in robot.joints.iter_mut().zip(&free.torques) {
+            joint.limits.effort = 1.02 * peak.value + 1e-3;
+            joint.limits.effort_rate = 0.6 * peak.rate.unwrap() + 1.0;
+        }
+        let plant = Plant::from(&robot);
+        for m in [
+            free,
+            Move::plan(&plant, &from, &to, &settings, None).unwrap(),
+        ] {
+            let limited = m.slowed > 1.0;
+            slowed += usize::from(limited);
+            let s = m.sample(1e5).unwrap();
+            let count = s.len();
+            let mut x = Samples::zeros(n, count);
+            x.q = s.q.concat();
+            x.qd = s.qd.concat();
+            x.qdd = s.qdd.concat();
+            let tau = plant.nominal_torque(&x).unwrap();
+            for (a, joint) in robot.joints.iter().enumerate() {
+                let (peak, limits) = (&m.torques[a], joint.limits);
+                let (bound, fastest) = (peak.bound.unwrap(), peak.rate_bound.unwrap());
+                assert!(peak.value <= bound * (1.0 + 1e-9), "{name} {peak:?}");
+                if limited {
+                    assert!(bound <= limits.effort * (1.0 + 1e-6), "{name} {peak:?}");
+                    assert!(fastest <= limits.effort_rate * (1.0 + 1e-6));
+                }
+                let dry = |i: usize| {
+                    let jump = joint.terms[JointTerm::Coulomb as usize];
+                    jump * term_factor(JointTerm::Coulomb, x.at(a, i))
+                };
+                for i in 0..count {
+                    let now = tau[a * count + i];
+                    assert!(
+                        now.abs() <= bound * (1.0 + 1e-9),
+                        "{name} {a}: {now} {bound}"
+                    );
+                    let h = if i == 0 { 0.0 } else { s.t[i] - s.t[i - 1] };
+                    if h > 5e-6 {
+                        let rate = (now - dry(i) - tau[a * count + i - 1] + dry(i - 1)) / h;
+                        assert!(
+                            rate.abs() <= fastest * (1.0 + 1e-6) + 1e-4,
+                            "{name} {a}: {rate} {fastest}"
+                        );
+                    }
+                }
+            }
+            let peak = m.tool.clone().unwrap();
+            let (speed, acceleration) =
+                (peak.speed_bound.unwrap(), peak.acceleration_bound.unwrap());
+            let tool = robot.tool.as_ref().unwrap();
+            if limited {
+                assert!(speed <= tool.speed * (1.0 + 1e-6));
+                assert!(acceleration <= tool.acceleration * (1.0 + 1e-6));
+            }
+            let at = |i: usize| {
+                let q: Vec<f64> = s.q.iter().map(|q| q[i]).collect();
+                let mut all = Vec::new();
+                poses(&robot, &q, &mut all);
+                all[tool.body].rotation * tool.point + all[tool.body].position
+            };
+            for i in 1..count {
+                let h = s.t[i] - s.t[i - 1];
+                if h > 5e-6 {
+                    let now = (at(i) - at(i - 1)).norm() / h;
+                    assert!(now <= speed * (1.0 + 1e-6), "{name}: {now} {speed}");
+                }
+            }
+        }
+    }
+    assert!(slowed >= 4, "{slowed}");
 }
