@@ -112,7 +112,9 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
             .map_or(Value::Null, platform),
     );
     put("load", a.load.as_ref().map_or(Value::Null, load));
-    put("answer", a.answer.as_ref().map_or(Value::Null, answer));
+    if let Some(a) = &a.answer {
+        put("answer", answer(a));
+    }
     put("version", json!(env!("CARGO_PKG_VERSION")));
     put("robot_hash", json!(a.robot.hash));
     put(
