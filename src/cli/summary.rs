@@ -2,7 +2,7 @@
 
 use excite::base::Identifiability;
 use excite::design::{Record, Status};
-use excite::identifiability::{Assessment, Excitation, LoadAccuracy};
+use excite::identifiability::{Answer, Assessment, Excitation, LoadAccuracy};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -29,6 +29,9 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
     if let Some(l) = &assessment.load {
         out.push_str(&load(l));
     }
+    if let Some(a) = &assessment.answer {
+        out.push_str(&answer(a));
+    }
     if let Some(r) = record {
         let how = match r.status {
             Status::Converged => "all starts followed to their end",
@@ -44,6 +47,38 @@ pub fn summary(assessment: &Assessment, record: Option<&Record>, files: &[PathBu
     }
     for f in files {
         let _ = writeln!(out, "wrote {}", f.display());
+    }
+    out
+}
+
+/// How well it tells the platform, the legs or the friction: the three values that are told worst.
+fn answer(a: &Answer) -> String {
+    let mut out = String::new();
+    let (known, judged) = a.known(10.0);
+    let _ = writeln!(
+        out,
+        "{}, {:.0} s, 95 %: {known} of {judged} values that are not zero to 10 % or better",
+        a.question.name(),
+        a.seconds
+    );
+    let relative = |e: &excite::identifiability::Expected| match e.std {
+        Some(s) => 1.96 * s / e.value.abs(),
+        None => f64::INFINITY,
+    };
+    let mut all: Vec<_> = a.expected.iter().filter(|e| e.value != 0.0).collect();
+    all.sort_by(|x, y| relative(y).total_cmp(&relative(x)));
+    for e in all.into_iter().take(3) {
+        let _ = match e.std {
+            Some(s) => writeln!(
+                out,
+                "  {} {:.3e} ± {:.1e} {}",
+                e.name,
+                e.value,
+                1.96 * s,
+                e.unit
+            ),
+            None => writeln!(out, "  {} not determined", e.name),
+        };
     }
     out
 }

@@ -89,7 +89,7 @@ impl Question {
 }
 
 /// Whether a column is one of a body other than that which carries a load.
-pub(super) fn of_legs(plant: &Plant, column: Column) -> bool {
+pub(crate) fn of_legs(plant: &Plant, column: Column) -> bool {
     matches!(column, Column::Inertial { body, .. } if plant.tool() != Some(body))
 }
 

@@ -19,7 +19,8 @@
 //! the square of an accuracy of [`ACCURACY`]. Constants of the drives count as free: they drift, and a motion that needs
 //! them to stay gains nothing where they do not.
 
-use super::purpose::{DENSITY, Question, of_legs};
+pub(crate) use super::purpose::of_legs;
+use super::purpose::{DENSITY, Question};
 use super::settings::Settings;
 use super::targets::{Targets, sizes};
 use crate::base::BaseParameters;

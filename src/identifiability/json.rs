@@ -3,7 +3,9 @@
 use super::page::reproduce::seed;
 use super::page::verdict::{verdict, violations};
 use crate::design::record::Record;
-use crate::identifiability::{Assessment, Excitation, GAIN, LoadAccuracy, Platform, Spread};
+use crate::identifiability::{
+    Answer, Assessment, Excitation, GAIN, LoadAccuracy, Platform, Spread,
+};
 use crate::trajectory::certificate::{JointCertificate, Peak};
 use crate::trajectory::{Proof, SampledBound, Space};
 use serde_json::{Map, Value, json};
@@ -110,6 +112,9 @@ pub fn json(assessment: &Assessment, record: Option<&Record>, seconds: f64) -> V
             .map_or(Value::Null, platform),
     );
     put("load", a.load.as_ref().map_or(Value::Null, load));
+    if let Some(a) = &a.answer {
+        put("answer", answer(a));
+    }
     put("version", json!(env!("CARGO_PKG_VERSION")));
     put("robot_hash", json!(a.robot.hash));
     put(
@@ -286,6 +291,23 @@ fn peak(p: &Peak) -> Value {
         "used": optional(p.used),
         "margin": optional(p.margin),
         "satisfied": p.satisfied(),
+    })
+}
+
+/// How well the motion tells what it was designed for.
+fn answer(a: &Answer) -> Value {
+    let one = |e: &crate::identifiability::Expected| {
+        json!({
+            "name": e.name,
+            "value": number(e.value),
+            "std": optional(e.std),
+            "unit": e.unit,
+        })
+    };
+    json!({
+        "for": a.question.name(),
+        "seconds": number(a.seconds),
+        "expected": a.expected.iter().map(one).collect::<Vec<_>>(),
     })
 }
 

@@ -11,7 +11,9 @@
 //! (white noise, independent between samples and joints; Swevers et al. 1997, eq. 11), whose
 //! diagonal gives the predicted standard deviation of every base parameter.
 
+mod answer;
 mod clearance;
+mod columns;
 mod elsewhere;
 mod hardly_moved;
 #[doc(hidden)]
@@ -20,11 +22,14 @@ mod load;
 #[doc(hidden)]
 pub mod page;
 mod platform;
+mod spread;
 
+pub use answer::{Answer, Expected};
 pub use clearance::{Clearances, LinkVolumes};
 pub use elsewhere::TorqueUncertainty;
-pub use load::{GAIN, LoadAccuracy, Spread};
+pub use load::{GAIN, LoadAccuracy};
 pub use platform::Platform;
+pub use spread::Spread;
 
 use crate::base::BaseParameters;
 use crate::design::{Question, Settings};
@@ -131,6 +136,8 @@ pub struct Assessment {
     pub excitation: Option<Excitation>,
     /// how well it tells a load, where it is meant for one or was asked
     pub load: Option<LoadAccuracy>,
+    /// how well it tells the platform, the legs or the friction, where it is meant for them
+    pub answer: Option<Answer>,
     /// everything imperfect: the robot's own, the rank's, the trajectory's
     pub warnings: Vec<Warning>,
 }
@@ -197,6 +204,7 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         condition_numbers(&all.base, w.as_ref(), &all.torque_noise)?;
     let kept = all.base.select(w.as_ref());
     let rows = weighted(kept.as_ref(), &all.torque_noise);
+    let rows = columns::beside_breakaway(plant, &motion, rows)?;
     let covariance = covariance(rows.as_ref(), f64::from(trajectory.periods));
     let predictions = predict(&all.values, &all.base, &covariance);
     let elsewhere = TorqueUncertainty::of(plant, &all.base, &covariance)?;
@@ -256,9 +264,15 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         view: Some(view),
     });
     let meant: Option<Settings> = serde_json::from_value(trajectory.settings.clone()).ok();
-    match meant.filter(|s| s.question == Some(Question::Load)) {
-        Some(s) => all.with_load(plant, trajectory, &s.load(plant), s.payload.is_some()),
-        None => Ok(all),
+    match meant.as_ref().and_then(|s| Some((s, s.question?))) {
+        Some((s, Question::Load)) => {
+            all.with_load(plant, trajectory, &s.load(plant), s.payload.is_some())
+        }
+        Some((_, question)) if question.check(plant).is_ok() => {
+            all.answer = Answer::of(plant, trajectory, question)?;
+            Ok(all)
+        }
+        _ => Ok(all),
     }
 }
 
@@ -276,6 +290,7 @@ fn alone(plant: &Plant) -> Result<Assessment> {
         torque_noise,
         excitation: None,
         load: None,
+        answer: None,
     })
 }
 

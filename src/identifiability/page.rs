@@ -2,6 +2,7 @@
 //!
 //! The same report stands for a robot alone; what needs a trajectory is then left out.
 
+mod answer;
 mod clearance;
 mod load;
 mod motion;
@@ -66,6 +67,7 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
         sections.push(clearance::section(e));
     }
     sections.extend(assessment.load.as_ref().map(load::section));
+    sections.extend(assessment.answer.as_ref().map(answer::section));
     sections.push(parameters::uncertainty(assessment));
     sections.push(spectrum::section(assessment));
     sections.extend(record.map(spectrum::history));

@@ -1,8 +1,8 @@
 //! The verdict in a sentence, built from the facts.
 
-use super::{KNOWN, clearance};
+use super::{KNOWN, answer, clearance};
 use crate::collision::build::in_words;
-use crate::identifiability::{Assessment, Excitation, LoadAccuracy, Platform};
+use crate::identifiability::{Answer, Assessment, Excitation, LoadAccuracy, Platform};
 use crate::mechanism::PoseKind;
 use crate::plant::PairClearance;
 use crate::report::format::{count, percent, significant, unit_of, with_unit};
@@ -142,6 +142,9 @@ pub fn verdict(a: &Assessment) -> Verdict {
     if let Some(l) = a.load.as_ref().filter(|_| a.meant_for_a_load()) {
         return for_a_load(l, &limits, &unchecked);
     }
+    if let Some(answer) = &a.answer {
+        return for_a_question(answer, &limits, &unchecked);
+    }
     let (known, judged) = e.known(KNOWN);
     let lost = e
         .predictions
@@ -216,6 +219,27 @@ fn for_a_load(l: &LoadAccuracy, limits: &str, unchecked: &str) -> Verdict {
             of(relative, 100.0, "%"),
             of(com, 1e3, "mm"),
             of(tensor, 100.0, "%"),
+        ),
+    }
+}
+
+/// Verdict on a motion that is meant for the platform, the legs or the friction: by how well it tells those.
+fn for_a_question(a: &Answer, limits: &str, unchecked: &str) -> Verdict {
+    let (known, judged) = a.known(KNOWN);
+    let subject = answer::subject(a.question);
+    let (grade, words) = match 2 * known >= judged && known > 0 {
+        true => (
+            Grade::Worthwhile,
+            format!("and worth running for {subject}"),
+        ),
+        false => (Grade::Weak, format!("but it hardly tells {subject}")),
+    };
+    Verdict {
+        grade,
+        text: format!(
+            "Inside its limits {words}: {limits}; recorded for {} it tells {known} of the {judged} values that are not zero in the robot \
+             file to {KNOWN}\u{a0}% or better (95\u{a0}%). {unchecked}",
+            with_unit(a.seconds, 3, "s"),
         ),
     }
 }
