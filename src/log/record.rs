@@ -195,7 +195,7 @@ impl Record {
                     table.rows(),
                     clock.t.len()
                 ),
-                false => too_few(clock.t.len(), &warnings),
+                false => too_few(table.rows(), &warnings),
             };
             return Err(Error::file(path, "", message));
         }

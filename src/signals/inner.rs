@@ -65,31 +65,30 @@ fn products<L: Lanes, const N: usize, const P: usize>(kernel: &[f64], x: [&[f64]
     let whole = length / SUMS * SUMS;
     // where a window is shorter, this panics
     let x = x.map(|x| &x[..length]);
-    let mut sums = [[L::splat(0.0); P]; N];
+    let mut sums = [[L::splat(0.0); N]; P];
     let mut at = 0;
     while at < whole {
-        for p in 0..P {
+        for (p, sums) in sums.iter_mut().enumerate() {
             let from = at + p * L::WIDTH;
-            // SAFETY: `from + WIDTH` is at most `whole`, and kernel and windows are at least as long
-            unsafe {
-                let w = L::load(kernel.as_ptr().add(from));
-                for n in 0..N {
-                    sums[n][p] = sums[n][p] + w * L::load(x[n].as_ptr().add(from));
-                }
+            // SAFETY: `from + WIDTH` is at most `whole`, and the kernel is at least as long
+            let w = unsafe { L::load(kernel.as_ptr().add(from)) };
+            for (sum, x) in sums.iter_mut().zip(x) {
+                // SAFETY: as for the kernel
+                *sum = *sum + w * unsafe { L::load(x.as_ptr().add(from)) };
             }
         }
         at += SUMS;
     }
     let mut out = [0.0; N];
-    for n in 0..N {
+    for (n, (out, x)) in out.iter_mut().zip(x).enumerate() {
         let mut s = [0.0; SUMS];
-        for p in 0..P {
+        for (p, sums) in sums.iter().enumerate() {
             // SAFETY: `P` packs are `SUMS` numbers
-            unsafe { sums[n][p].store(s.as_mut_ptr().add(p * L::WIDTH)) };
+            unsafe { sums[n].store(s.as_mut_ptr().add(p * L::WIDTH)) };
         }
-        let rest = kernel[whole..].iter().zip(&x[n][whole..]);
+        let rest = kernel[whole..].iter().zip(&x[whole..]);
         let rest: f64 = rest.map(|(x, y)| x * y).sum();
-        out[n] = rest + ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
+        *out = rest + ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
     }
     out
 }
