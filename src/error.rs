@@ -6,6 +6,11 @@
 
 use std::path::{Path, PathBuf};
 
+/// Number, from 1, of the line of a text in which a byte stands.
+pub(crate) fn line_of(text: &str, at: usize) -> usize {
+    1 + text.bytes().take(at).filter(|b| *b == b'\n').count()
+}
+
 /// What can go wrong before a computation starts: unreadable, malformed or contradictory input.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

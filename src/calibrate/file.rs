@@ -5,7 +5,7 @@ use super::frame::Frame;
 use super::kind::Kind;
 use super::row::{Row, Source};
 use super::rows;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, line_of};
 use crate::robot::holds_robot;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -155,10 +155,7 @@ impl Calibration {
         open: impl FnOnce(&str, Option<&str>, Option<&str>) -> Result<(K, Vec<String>)>,
     ) -> Result<(Self, K)> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-        let place = |at: usize| {
-            let line = text.bytes().take(at).filter(|b| *b == b'\n').count();
-            format!("line {}", line + 1)
-        };
+        let place = |at: usize| format!("line {}", line_of(&text, at));
         let file: File = toml::from_str(&text).map_err(|e| {
             let at = e.span().map_or(String::new(), |s| place(s.start));
             Error::file(path, at, e.message().trim().replace('\n', "; "))

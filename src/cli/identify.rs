@@ -4,7 +4,7 @@ use super::{Folder, into, outside, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
 use excite::identify::page;
 use excite::identify::{
-    Consistency, Identification, Method, Settings, identify, identify_parts, json,
+    Consistency, Identification, Method, Settings, condense_parts, identify, identify_parts, json,
 };
 use excite::log::{Outline, Record};
 use excite::robot::JointTerm;
@@ -73,8 +73,8 @@ pub struct Args {
     /// coulomb and offset where that of a serial one lists none for any joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
-    /// Read the logs in parts of so many rows, and hold no more than one part at a time; 0 reads them whole [default:
-    /// 250000 where a log has more than about a million rows, else 0]
+    /// Read the logs in parts of so many rows, and hold no more than two parts at a time; 0 reads them whole [default:
+    /// 250000 where a CSV has more than 100 MB or a bag more than 50 MB, else 0]
     #[arg(long, value_name = "N")]
     rows: Option<usize>,
     /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
@@ -142,7 +142,8 @@ pub fn run(args: Args) -> Result<()> {
         }
         rows => {
             let check = |part: &Record| survey::check(&outline.plant, std::slice::from_ref(part));
-            identify_parts(&outline, plant, asked, rows, &settings, &check)?
+            let condensed = condense_parts(&outline, plant, asked, rows, &settings, &check)?;
+            identify_parts(plant, condensed)?
         }
     };
     id.warnings.splice(0..0, notes);

@@ -46,10 +46,10 @@ pub(super) fn breakaway(plant: &Plant, speeds: bool) -> Vec<(usize, Kind, Stribe
 
 /// Slope of the breakaway friction by its force or its speed.
 pub(super) fn slope(kind: Kind, s: Stribeck, velocity: f64) -> f64 {
-    let u = velocity / s.velocity;
+    let [force, speed] = s.slopes(velocity);
     match kind {
-        Kind::Speed => 2.0 * u * u / s.velocity * s.torque(velocity),
-        _ => Stribeck { force: 1.0, ..s }.torque(velocity),
+        Kind::Speed => speed,
+        _ => force,
     }
 }
 

@@ -3,7 +3,6 @@
 use super::breakaway::Breakaway;
 use super::cross_validation::Trial;
 use super::essential::Essential;
-use super::in_parts::Share;
 use super::validation::Validation;
 use crate::base::BaseParameters;
 use crate::error::Warning;
@@ -11,6 +10,19 @@ use crate::plant::Plant;
 use crate::robot::{Prior, Robot};
 use crate::signals::Prepared;
 use faer::Mat;
+
+/// How a record was read that came in parts.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct Share {
+    /// name of the record
+    pub record: String,
+    /// rows that were used
+    pub rows: usize,
+    /// parts in which they were read
+    pub parts: usize,
+    /// rows that figures show
+    pub shown: usize,
+}
 
 /// What identification came to.
 #[derive(Debug, Clone, serde::Serialize)]

@@ -12,10 +12,11 @@
 use super::condense::of_records;
 use super::equations::{self, Equations};
 use super::factor::Factor;
+use super::identification::{Identification, Share};
 use super::merge::{Merged, merge};
 use super::settings::{Method, Settings};
 use super::validation::{Errors, validate};
-use super::{Identification, doubts, uncertainty};
+use super::{doubts, uncertainty};
 use crate::base::BaseParameters;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Outline, Payload, Purpose, Record};
@@ -27,19 +28,6 @@ use std::ops::ControlFlow;
 const SHOWN: usize = 60_000;
 /// Most records that figures show.
 const RECORDS: usize = 6;
-
-/// How a record was read.
-#[derive(Debug, Clone, serde::Serialize)]
-pub struct Share {
-    /// name of the record
-    pub record: String,
-    /// rows that were used
-    pub rows: usize,
-    /// parts in which they were read
-    pub parts: usize,
-    /// rows that figures show
-    pub shown: usize,
-}
 
 /// Records that were read in parts.
 pub struct Condensed {
@@ -58,7 +46,7 @@ pub struct Condensed {
 /// The cut-off, where none is stated, is chosen from the first part of each fit record in which something moves.
 ///
 /// # Errors
-/// As [`Record::read_parts`] and [`condense`](super::condense()).
+/// As [`Record::read_parts`] and [`condense`](super::condense()); a method that needs all samples at once.
 pub fn condense_parts(
     outline: &Outline,
     plant: &Plant,
@@ -67,6 +55,13 @@ pub fn condense_parts(
     settings: &Settings,
     check: &dyn Fn(&Record) -> Result<Vec<Warning>>,
 ) -> Result<Condensed> {
+    if !matches!(settings.method, Method::Ols | Method::Wls) {
+        return Err(Error::Argument(
+            "the logs are so long that they are read in parts, for which the methods are ols and wls; --rows 0 reads \
+             them whole"
+                .into(),
+        ));
+    }
     let purposes = outline.purposes();
     let settings = one_filter(outline, rows, settings)?;
     let base = plant.base()?;
@@ -207,46 +202,28 @@ fn head(part: &Record) -> Record {
     out
 }
 
-/// Identifies a plant from the records of an experiment, read in parts of `rows` rows; `check` looks at each part.
+/// Identifies a plant from records that were condensed in parts.
 ///
 /// # Errors
-/// As [`identify`](super::identify()); a method that needs all samples at once.
-pub fn identify_parts(
-    outline: &Outline,
-    plant: &Plant,
-    asked: Option<&[String]>,
-    rows: usize,
-    settings: &Settings,
-    check: &dyn Fn(&Record) -> Result<Vec<Warning>>,
-) -> Result<Identification> {
-    if !matches!(settings.method, Method::Ols | Method::Wls) {
-        return Err(Error::Argument(
-            "the logs are so long that they are read in parts, for which the methods are ols and wls; --rows 0 reads \
-             them whole"
-                .into(),
-        ));
-    }
-    let Condensed {
-        factor,
-        shown,
-        shares,
-        settings,
-    } = condense_parts(outline, plant, asked, rows, settings, check)?;
-    let merged = merge(plant, vec![factor.clone()], &settings)?;
-    let base = plant.base()?;
-    found(plant, base, &factor, merged, &shown, shares, &settings)
+/// As [`identify`](super::identify()).
+pub fn identify_parts(plant: &Plant, records: Condensed) -> Result<Identification> {
+    let merged = merge(plant, vec![records.factor.clone()], &records.settings)?;
+    found(plant, plant.base()?, merged, records)
 }
 
 /// The result as of records that were read whole.
 fn found(
     plant: &Plant,
     base: BaseParameters,
-    factor: &Factor,
     merged: Merged,
-    shown: &[Record],
-    shares: Vec<Share>,
-    settings: &Settings,
+    records: Condensed,
 ) -> Result<Identification> {
+    let Condensed {
+        factor,
+        shown,
+        shares,
+        settings,
+    } = records;
     let equations = Equations::new(plant, &base, &settings.signals, shown.iter().collect())?;
     let models = [&merged.pi, &merged.pi_consistent, &merged.essential.pi];
     let mut validation = validate(&equations, models.map(Vec::as_slice))?;

@@ -126,14 +126,11 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
     let essential = essential::reduce(normal.factor.as_ref(), rows as usize, inflation)?;
     let nominal = base.project(&plant.values());
     let joints: Vec<String> = plant.actuators().iter().map(|j| j.name.clone()).collect();
+    let holdout = factor.folds(1);
     let errors_of = |models: [&[f64]; 2]| {
-        [0, 1].map(|p| {
-            let stacks = match p {
-                0 => vec![fitted.clone()],
-                _ => factor.folds(p),
-            };
-            models.map(|pi| errors(&stacks, &header.parts[p], pi, &joints))
-        })
+        let of = |stacks: &[Stack], part: &Part| models.map(|pi| errors(stacks, part, pi, &joints));
+        let [fit, other] = &header.parts;
+        [of(std::slice::from_ref(&fitted), fit), of(&holdout, other)]
     };
     let errors = errors_of([&nominal, &found.pi]);
     let other_errors = errors_of([&normal.pi, &essential.pi]);

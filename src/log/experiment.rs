@@ -1,10 +1,9 @@
 //! A robot and its records.
 
-use super::outline::Outline;
 use super::{Purpose, Record};
-use crate::error::{Result, Warning};
+use crate::error::Warning;
 use crate::plant::Plant;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A robot and what was recorded of it.
 #[derive(Debug)]
@@ -21,16 +20,6 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// Reads an `experiment.toml`, its robot and its logs. Paths in it are relative to it; a robot
-    /// that is no file beside it may be a bundled one.
-    ///
-    /// # Errors
-    /// Unknown or missing keys, a robot or log that cannot be read, logs that do not fit the robot:
-    /// each with the file and line.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        Outline::read(path)?.whole()
-    }
-
     /// Records for one purpose.
     pub fn records(&self, purpose: Purpose) -> impl Iterator<Item = &Record> {
         self.records.iter().filter(move |r| r.purpose == purpose)

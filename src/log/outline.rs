@@ -5,7 +5,7 @@ use super::layout::Layout;
 use super::record::Reading;
 use super::{Experiment, Payload, Purpose, Record};
 use super::{pose_check, pressure};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, line_of};
 use crate::plant::Plant;
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -88,6 +88,18 @@ struct PayloadBody {
     inertia: Option<[f64; 6]>,
 }
 
+impl Experiment {
+    /// Reads an `experiment.toml`, its robot and its logs. Paths in it are relative to it; a robot
+    /// that is no file beside it may be a bundled one.
+    ///
+    /// # Errors
+    /// Unknown or missing keys, a robot or log that cannot be read, logs that do not fit the robot:
+    /// each with the file and line.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        Outline::read(path)?.whole()
+    }
+}
+
 impl Outline {
     /// Reads an `experiment.toml` and its robot.
     ///
@@ -96,10 +108,7 @@ impl Outline {
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-        let place = |at: usize| {
-            let line = text.bytes().take(at).filter(|b| *b == b'\n').count();
-            format!("line {}", line + 1)
-        };
+        let place = |at: usize| format!("line {}", line_of(&text, at));
         let file: File = toml::from_str(&text).map_err(|e| {
             let at = e.span().map_or(String::new(), |s| place(s.start));
             let message = e.message().trim().replace('\n', "; ");

@@ -270,7 +270,7 @@ fn bounded(plant: &Plant, found: &Bounds) -> Most {
 }
 
 /// What all legs exceed at no time; `None` where that is only sampled.
-fn all_bounds(plant: &Plant, legs: &[Leg]) -> Result<Option<Bounds>> {
+pub fn all_bounds(plant: &Plant, legs: &[Leg]) -> Result<Option<Bounds>> {
     let mut out: Option<Bounds> = None;
     for leg in legs {
         let own = bounds(plant, leg)?;
@@ -317,24 +317,21 @@ fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     Ok(Ok(slow))
 }
 
-/// Largest speed and acceleration of the tool point of all legs.
-pub fn tool(plant: &Plant, legs: &[Leg]) -> Result<Option<ToolPeak>> {
+/// Largest speed and acceleration of the tool point of all legs, and their bounds.
+pub fn tool(plant: &Plant, legs: &[Leg], bounds: Option<&Bounds>) -> Option<ToolPeak> {
     let each = legs
         .iter()
         .filter_map(|leg| ToolPeak::of(plant, &samples(leg).0));
-    let Some(mut most) = each.reduce(|a, b| a.or(&b)) else {
-        return Ok(None);
-    };
-    if let Some(found) = all_bounds(plant, legs)? {
-        let [speed, acceleration] = found.tool;
-        most.speed_bound = most.speed_used.map(|_| speed);
-        most.acceleration_bound = most.acceleration_used.map(|_| acceleration);
+    let mut most = each.reduce(|a, b| a.or(&b))?;
+    if let Some(Bounds { tool, .. }) = bounds {
+        most.speed_bound = most.speed_used.map(|_| tool[0]);
+        most.acceleration_bound = most.acceleration_used.map(|_| tool[1]);
     }
-    Ok(Some(most))
+    Some(most)
 }
 
-/// Largest torques of all legs.
-pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
+/// Largest torques of all legs, and their bounds.
+pub fn peaks(plant: &Plant, legs: &[Leg], bounds: Option<&Bounds>) -> Result<Vec<TorquePeak>> {
     let joints = plant.actuators();
     let mut most = vec![0.0; joints.len()];
     let mut rates = most.clone();
@@ -342,7 +339,6 @@ pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
         let (x, step) = samples(leg);
         torques(plant, &x, step, &mut most, &mut rates)?;
     }
-    let found = all_bounds(plant, legs)?;
     let each = joints.iter().zip(most).zip(rates).enumerate();
     Ok(each
         .map(|(a, ((joint, value), rate))| {
@@ -357,8 +353,8 @@ pub fn peaks(plant: &Plant, legs: &[Leg]) -> Result<Vec<TorquePeak>> {
                 used: limit.map(|l| value / l),
                 rate,
                 rate_used: rate.map(|r| r / fastest),
-                bound: limit.and(found.as_ref()).map(|b| b.torque[a]),
-                rate_bound: rate.and(found.as_ref()).map(|b| b.rate[a]),
+                bound: limit.and(bounds).map(|b| b.torque[a]),
+                rate_bound: rate.and(bounds).map(|b| b.rate[a]),
             }
         })
         .collect())

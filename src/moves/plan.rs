@@ -3,7 +3,7 @@
 use super::guard::{Blocked, Guard, Line};
 use super::leg::Leg;
 use super::limits::{by_position, inside, limits, raised, scaled, still_at};
-use super::load::{Most, bearable, peaks, tool};
+use super::load::{Most, all_bounds, bearable, peaks, tool};
 use super::moving::{braked, through};
 use super::planner::{Found, search};
 use super::profile::Profile;
@@ -364,14 +364,15 @@ impl Planner<'_> {
                 }),
             }
         });
+        let bounds = all_bounds(self.plant, &whole)?;
         let mut found = Move {
             duration: whole.iter().map(|leg| leg.duration).sum(),
             from: from.clone(),
             to: to.clone(),
             via: via.collect(),
             joints: joints.collect(),
-            torques: peaks(self.plant, &whole)?,
-            tool: tool(self.plant, &whole)?,
+            torques: peaks(self.plant, &whole, bounds.as_ref())?,
+            tool: tool(self.plant, &whole, bounds.as_ref()),
             slowed: whole.iter().map(|leg| leg.slowed).fold(1.0, f64::max),
             scale: whole.iter().map(|leg| leg.scale).fold(0.0, f64::max),
             clearance: None,

@@ -9,7 +9,7 @@ mod tool;
 use super::geometry::{CollisionEntry, Entries, KeepInEntry, ShapeEntry};
 use super::urdf::{Options, Urdf};
 use super::{Prior, Robot, bundled, mjcf, xacro};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, line_of};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -56,7 +56,7 @@ pub(crate) struct Text<'a> {
 impl Text<'_> {
     /// An error at a byte of the text, about `what` (may be empty).
     pub(crate) fn error(&self, at: usize, what: &str, message: impl Into<String>) -> Error {
-        let line = 1 + self.text.bytes().take(at).filter(|b| *b == b'\n').count();
+        let line = line_of(self.text, at);
         let colon = if what.is_empty() { "" } else { ": " };
         Error::file(self.file, format!("line {line}{colon}{what}"), message)
     }

@@ -42,6 +42,16 @@ impl Stribeck {
             false => self.level(velocity) * velocity.signum(),
         }
     }
+
+    /// Slopes of [`Stribeck::torque`] by `force` and by `velocity`; it is linear in the first.
+    pub fn slopes(self, velocity: f64) -> [f64; 2] {
+        let u = velocity / self.velocity;
+        let one = Stribeck { force: 1.0, ..self };
+        [
+            one.torque(velocity),
+            2.0 * u * u / self.velocity * self.torque(velocity),
+        ]
+    }
 }
 
 #[cfg(test)]

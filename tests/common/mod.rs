@@ -6,6 +6,7 @@ pub mod five_bar;
 pub mod noise;
 pub mod parallel;
 pub mod parallel_toml;
+pub mod parts;
 pub mod python;
 pub mod rehearse;
 pub mod shared;

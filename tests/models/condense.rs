@@ -1,10 +1,11 @@
 //! Condensed records: the same estimate as from the records, in any order and grouping.
 
+use crate::common::parts;
 use crate::common::rehearse;
 use crate::common::shared::shared;
 use excite::Plant;
 use excite::identify::{
-    Factor, Merged, Method, Settings, condense, identify, identify_parts, merge,
+    Factor, Merged, Method, Settings, condense, condense_parts, identify, identify_parts, merge,
 };
 use excite::log::{Experiment, Outline, Purpose, Record};
 use excite::robot::JointTerm;
@@ -130,13 +131,7 @@ fn many_files_are_as_good_as_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("day.csv");
     write_csv(&path, run);
-    let mut parts = Vec::new();
-    let rows = run.len() / 12;
-    Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |part| {
-        parts.push(part);
-        Ok(())
-    })
-    .unwrap();
+    let parts = parts::read(&path, &plant, run.len() / 12);
     assert!(parts.len() > 10);
     let wls = settings(Method::Wls);
     let whole = identify(&plant, &parts, &wls).unwrap();
@@ -168,23 +163,12 @@ fn a_log_in_parts_is_the_same_log() {
     write_csv(&path, run);
     let whole = Record::read(&path, &plant, Purpose::Fit, None).unwrap();
     let rows = run.len() / 4 + 7;
-    let mut parts = Vec::new();
-    Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |part| {
-        parts.push(part);
-        Ok(())
-    })
-    .unwrap();
+    let parts = parts::read(&path, &plant, rows);
     let sizes: Vec<usize> = parts.iter().map(Record::len).collect();
     let last = *sizes.last().unwrap();
     assert!(sizes.len() >= 3 && sizes[..sizes.len() - 1].iter().all(|n| *n == rows));
     assert!(2 * last >= rows && 2 * last < 3 * rows, "{sizes:?}");
-    for j in 0..2 {
-        let channel = |of: fn(&Record) -> &Vec<Vec<f64>>| -> Vec<f64> {
-            parts.iter().flat_map(|p| of(p)[j].clone()).collect()
-        };
-        assert_eq!(channel(|r| &r.q), whole.q[j]);
-        assert_eq!(channel(|r| &r.tau), whole.tau[j]);
-    }
+    parts::hold(&parts, &whole, "in parts");
 
     let mut factors = parts.iter().map(|p| of(&plant, std::slice::from_ref(p)));
     let first = factors.next().unwrap();
@@ -214,15 +198,7 @@ fn an_experiment_in_parts_is_identified_from_all_of_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let mut toml = String::from("robot = \"planar2\"\n");
     for (k, run) in records(&plant).iter().enumerate() {
-        let mut text = String::from("t,q1,q2,tau1,tau2\n");
-        for i in 0..run.len() {
-            let [q, tau] = [&run.q, &run.tau];
-            text += &[run.t[i], q[0][i], q[1][i], tau[0][i], tau[1][i]]
-                .map(|x| format!("{x:?}"))
-                .join(",");
-            text.push('\n');
-        }
-        std::fs::write(folder.path().join(format!("{k}.csv")), text).unwrap();
+        write_csv(&folder.path().join(format!("{k}.csv")), run);
         let purpose = if k == 2 { "holdout" } else { "fit" };
         toml += &format!("[[record]]\nlog = \"{k}.csv\"\nuse = \"{purpose}\"\n");
     }
@@ -234,7 +210,10 @@ fn an_experiment_in_parts_is_identified_from_all_of_its_rows() {
     let rows = 1700;
     let mut settings = settings(Method::Wls);
     let none = |_: &Record| Ok(Vec::new());
-    let found = identify_parts(&outline, &plant, None, rows, &settings, &none).unwrap();
+    let condensed =
+        |settings: &Settings| condense_parts(&outline, &plant, None, rows, settings, &none);
+    let identified = |settings: &Settings| identify_parts(&plant, condensed(settings).unwrap());
+    let found = identified(&settings).unwrap();
     let mut parts = Vec::new();
     for k in 0..3 {
         outline
@@ -274,12 +253,12 @@ fn an_experiment_in_parts_is_identified_from_all_of_its_rows() {
 
     // without a cut-off, that of the fastest fit record counts
     settings.signals.cutoff = None;
-    let chosen = identify_parts(&outline, &plant, None, rows, &settings, &none).unwrap();
+    let chosen = identified(&settings).unwrap();
     let fit: Vec<&Record> = parts.iter().filter(|p| p.purpose == Purpose::Fit).collect();
     let cutoff = excite::signals::common_cutoff([fit[0]]);
     assert!(chosen.prepared[0].filter.cutoff >= cutoff);
     settings.method = Method::Robust;
-    let error = identify_parts(&outline, &plant, None, rows, &settings, &none).unwrap_err();
+    let error = condensed(&settings).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("--rows 0"), "{error}");
 }
 

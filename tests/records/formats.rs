@@ -1,5 +1,6 @@
 //! Logs as others write them: every format, every layout, and what an experiment states about columns.
 
+use crate::common::parts;
 use crate::common::shared::shared;
 use excite::Plant;
 use excite::log::{Experiment, Purpose, Record};
@@ -140,12 +141,7 @@ fn bags_and_tables_come_in_parts_as_they_come_whole() {
     for path in paths {
         let whole = Record::read(&path, &plant, Purpose::Fit, None).unwrap();
         for rows in [64, 90, 150, 1000] {
-            let mut parts = Vec::new();
-            Record::read_parts(&path, &plant, Purpose::Fit, None, rows, &mut |part| {
-                parts.push(part);
-                Ok(())
-            })
-            .unwrap();
+            let parts = parts::read(&path, &plant, rows);
             let sizes: Vec<usize> = parts.iter().map(Record::len).collect();
             let what = format!("{} in parts of {rows}: {sizes:?}", path.display());
             assert_eq!(sizes.iter().sum::<usize>(), whole.len(), "{what}");
@@ -155,13 +151,7 @@ fn bags_and_tables_come_in_parts_as_they_come_whole() {
                     .all(|n| 2 * n >= rows.min(whole.len()) && 2 * n < 3 * rows),
                 "{what}"
             );
-            for j in 0..2 {
-                let channel = |of: fn(&Record) -> &Vec<Vec<f64>>| -> Vec<f64> {
-                    parts.iter().flat_map(|p| of(p)[j].clone()).collect()
-                };
-                assert_eq!(channel(|r| &r.q), whole.q[j], "{what}");
-                assert_eq!(channel(|r| &r.tau), whole.tau[j], "{what}");
-            }
+            parts::hold(&parts, &whole, &what);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Weighted rows of all records, and the terms that explain most of what all else leaves.
 
+use crate::robot::Stribeck;
 use crate::signals::Prepared;
 use faer::linalg::solvers::{DenseSolveCore, Solve};
 use faer::{Mat, Side};
@@ -91,16 +92,14 @@ impl Rows<'_> {
         }
         out
     }
+}
 
-    fn factor(&self, speed: f64) -> impl Fn(f64) -> f64 {
-        move |v: f64| (-(v / speed).powi(2)).exp() * v.signum()
-    }
-
-    fn slope(&self, speed: f64) -> impl Fn(f64) -> f64 {
-        move |v: f64| {
-            let u = v / speed;
-            2.0 * u * u / speed * (-u * u).exp() * v.signum()
-        }
+/// Breakaway friction of force one that falls to `1/e` at this speed.
+fn unit(speed: f64) -> Stribeck {
+    Stribeck {
+        force: 1.0,
+        velocity: speed,
+        fit: false,
     }
 }
 
@@ -143,7 +142,9 @@ impl<'a> Turn<'a> {
 
     /// `P s` of a drive at a speed.
     fn peak(&self, a: usize, speed: f64) -> Mat<f64> {
-        let column = self.rows.column(a, self.sigma[a], self.rows.factor(speed));
+        let column = self
+            .rows
+            .column(a, self.sigma[a], |v| unit(speed).torque(v));
         self.projected(&column)
     }
 
@@ -231,8 +232,12 @@ impl<'a> Turn<'a> {
         let kept: Vec<(usize, f64, f64)> = terms(state);
         let mut j = Mat::<f64>::zeros(self.rows.y.len(), 2 * kept.len());
         for (k, &(a, force, speed)) in kept.iter().enumerate() {
-            let peak = self.rows.column(a, self.sigma[a], self.rows.factor(speed));
-            let slope = self.rows.column(a, self.sigma[a], self.rows.slope(speed));
+            let peak = self
+                .rows
+                .column(a, self.sigma[a], |v| unit(speed).torque(v));
+            let slope = self
+                .rows
+                .column(a, self.sigma[a], |v| unit(speed).slopes(v)[1]);
             for i in 0..j.nrows() {
                 j[(i, 2 * k)] = peak[(i, 0)];
                 j[(i, 2 * k + 1)] = force * slope[(i, 0)];
