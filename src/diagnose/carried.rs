@@ -10,7 +10,7 @@
 //!
 //! over all records. A load has a positive mass within reach of the flange, gains more than parameters do by chance, more
 //! than a load in all records would, explains the larger part of what sets the records apart, is the same in both halves
-//! of its records, and beats its decoys. Then the records count as carrying an unknown load
+//! of its records, is heavier than its uncertainty, and beats its decoys. Then the records count as carrying an unknown load
 //! ([`super::payload`]), whose ten parameters are fitted beside the effects.
 
 use super::column::Column;
@@ -97,6 +97,10 @@ fn among(data: &Data, tool: usize) -> Result<Option<Carried>> {
     let own = only(data, &columns, &set);
     let decoys = decoy::largest(&evidence, (&own, &projected), &eta, &[], gain);
     let unsteady = unsteady(data, &evidence, &own, &set, before, gain);
+    let sure = evidence.fit(&[&projected]).covariance[0][0]
+        .max(0.0)
+        .sqrt()
+        .max(1e-300);
     let explains = explained(data, &evidence, &projected, &set);
     let confidence = T.confidence.surprise.above(gain)
         * T.confidence.decoys.below(decoys)
@@ -104,7 +108,8 @@ fn among(data: &Data, tool: usize) -> Result<Option<Carried>> {
         * T.carried.share.above(explains)
         * T.carried
             .beyond
-            .above(1.0 - in_all.max(0.0) / gain.max(1e-9));
+            .above(1.0 - in_all.max(0.0) / gain.max(1e-9))
+        * T.carried.mass.above(eta[0] / sure);
     Ok((confidence >= T.confidence.claim).then(|| {
         let mut records: Vec<usize> = set.iter().map(|k| data.records[*k].order).collect();
         records.sort_unstable();
@@ -183,7 +188,10 @@ fn explained(data: &Data, evidence: &Evidence, load: &Projected, records: &[usiz
         .flat_map(|k| (0..data.joints()).map(|j| data.records[*k].counts(j) as f64))
         .sum();
     let [without, with] = [energy(&[]), energy(&[load])];
-    ((without - with) / (without - rows).max(1e-9)).clamp(0.0, 1.0)
+    match without > rows {
+        true => ((without - with) / (without - rows)).clamp(0.0, 1.0),
+        false => 0.0,
+    }
 }
 
 impl Carried {

@@ -7,12 +7,10 @@ use super::column::{Column, Columns};
 use super::noise::{Noise, ORDER};
 use super::prior::{self, Closeness, factors};
 use super::rigid::{inertia, rigid};
-use super::thresholds::THRESHOLDS as T;
-use super::window::{averaged, fine, sign};
+use super::window::{averaged, fine};
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::plant::{self, Parameter, Plant};
-use crate::robot::JointTerm;
 use crate::signals::series::Series;
 use rayon::prelude::*;
 
@@ -48,6 +46,9 @@ pub struct Data<'a> {
     /// variance of the window over which the torque channel averages, beyond plus and minus one
     /// sample, in samples squared; negative where it takes the torque at an instant
     pub window: f64,
+    /// time by which dry friction reverses before the velocity does, s: a simulator that regularises friction by a
+    /// velocity and an acceleration, `sgn(q̇ + T q̈)`; 0 for a machine
+    pub lead: f64,
     /// largest speed of each actuator in the fitted records
     pub speed: Vec<f64>,
     /// lowest and highest position of each actuator in the fitted records
@@ -167,6 +168,7 @@ impl<'a> Data<'a> {
             inertia: inertia(plant, &records[0])?,
             records,
             window: 0.0,
+            lead: 0.0,
             speed,
             range,
             tool: Vec::new(),
@@ -211,33 +213,11 @@ impl<'a> Data<'a> {
     /// Measured torque less a model's, as the torque channel would show it.
     pub fn gap_to(&self, model: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let of = |j: usize| {
-            let model = self.windowed(&model[j]);
-            self.tau[j].iter().zip(&model).map(|(a, b)| a - b).collect()
+            let model = self.shown(j, &model[j]);
+            let measured = self.torque(j);
+            measured.iter().zip(&model).map(|(a, b)| a - b).collect()
         };
-        self.silenced((0..self.joints()).map(of).collect())
-    }
-
-    /// Coulomb columns with the sign averaged as the torque is.
-    fn coulomb(&mut self) {
-        let actuated = self.plant.actuated();
-        for c in 0..self.parameters.len() {
-            let plant::Column::Term {
-                joint,
-                term: JointTerm::Coulomb,
-            } = self.parameters[c].kind
-            else {
-                continue;
-            };
-            let Some(j) = actuated.iter().position(|a| *a == joint) else {
-                continue;
-            };
-            if self.plant.redundant() {
-                // friction of one drive acts on others, too: left as it is
-                continue;
-            }
-            let column = self.own(j, |_, v| sign(v, T.reversals.sharp * self.speed[j]));
-            self.w[j].write(c).copy_from_slice(&column);
-        }
+        self.told(self.silenced((0..self.joints()).map(of).collect()))
     }
 
     /// A function of the position and velocity of one actuator, averaged over the triangle of plus
@@ -284,55 +264,6 @@ impl<'a> Data<'a> {
             self.noise[j].unwhiten(&plain[self.span(k)], &mut out);
         }
         out
-    }
-
-    /// A modelled signal of all records as the torque channel would show it, whitened.
-    pub fn modelled(&self, j: usize, x: &[f64]) -> Vec<f64> {
-        if self.window == 0.0 {
-            return self.whiten(j, x);
-        }
-        self.whiten(j, &self.windowed(x))
-    }
-
-    /// A modelled signal of all records as the torque channel would show it: passes of the kernel
-    /// `[c/2, 1 − c, c/2]` until their variances sum to the window's.
-    pub fn windowed(&self, x: &[f64]) -> Vec<f64> {
-        let passes = (self.window.abs() / T.window.pass).ceil() as usize;
-        let mut x = x.to_vec();
-        if passes == 0 {
-            return x;
-        }
-        let half = 0.5 * self.window / passes as f64;
-        for _ in 0..passes {
-            for k in 0..self.records.len() {
-                let x = &mut x[self.span(k)];
-                let last = x.len() - 1;
-                let mut before = x[0];
-                for i in 0..=last {
-                    let (here, after) = (x[i], x[(i + 1).min(last)]);
-                    x[i] = here + half * (before - 2.0 * here + after);
-                    before = here;
-                }
-            }
-        }
-        x
-    }
-
-    /// Second differences of a modelled torque: what a wider window would change.
-    pub fn curvature(&self, model: &[Vec<f64>]) -> Column {
-        let rows = model.iter().enumerate().map(|(j, model)| {
-            let mut out = vec![0.0; self.rows()];
-            for k in 0..self.records.len() {
-                let span = self.span(k);
-                for i in span.start + 1..span.end - 1 {
-                    out[i] = 0.5 * (model[i - 1] - 2.0 * model[i] + model[i + 1]);
-                }
-            }
-            (j, out)
-        });
-        Column {
-            rows: rows.collect(),
-        }
     }
 
     /// Scales the prior by what the records say of how close the model is.

@@ -26,6 +26,7 @@ pub(crate) mod at_rest;
 pub(crate) mod carried;
 #[doc(hidden)]
 pub mod catalogue;
+mod channel;
 pub(crate) mod closeness;
 pub(crate) mod column;
 #[doc(hidden)]
@@ -85,6 +86,7 @@ use crate::log::{self, Experiment, Purpose};
 use crate::plant::Plant;
 use crate::signals::series::Series;
 use catalogue::Context;
+use channel::Channel;
 use data::Data;
 use evidence::Evidence;
 use rayon::prelude::*;
@@ -110,21 +112,16 @@ pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
     let mut data = Data::new(plant, records)?;
     data.ordinary();
     data.carry()?;
-    // the width of the window of the torque channel, then what the encoders cannot resolve
+    // what the log makes of a torque, then what the encoders cannot resolve
     for pass in 0..2 {
-        let e = Evidence::new(&data, 1.0);
-        let none = e.fit(&[]);
-        let phi = e.parameters(&[], &none);
-        let model = data.model_torque(&phi);
-        let wider = e.project(&[data.curvature(&model)]);
-        let found = e.fit(&[&wider]).eta[0];
-        drop(e);
-        data.window = window(data.window + found);
+        let channel = Channel::of(&data);
+        data.window = channel.window;
+        data.reverse_early(channel.lead);
         if pass == 0 {
-            let residual = data.gap_to(&model);
+            let residual = data.gap_to(&data.model_torque(&channel.phi));
             data.limit_excess(&residual);
         }
-        data.start_from_load(&phi);
+        data.start_from_load(&channel.phi);
     }
     Ok(data)
 }
@@ -237,11 +234,11 @@ pub fn of_logs(
     let verdict = match (data.moves(), &carried) {
         // nothing was compared
         (false, _) => Verdict::Unknown,
-        (true, None) => honest(decision.verdict, &residual_gap),
+        (true, None) => honest(decision.verdict, &residual_gap, &data),
         (true, Some(load)) => {
             let body = finding::carried(&evidence, &cx, &phi_after, load, effects.as_slice());
             findings.splice(0..0, body);
-            match honest(decision.verdict, &residual_gap) {
+            match honest(decision.verdict, &residual_gap, &data) {
                 Verdict::NoGap => Verdict::Explained,
                 Verdict::Unknown => Verdict::PartlyExplained,
                 other => other,
@@ -299,19 +296,11 @@ pub fn of_logs(
 
 /// `no_gap` only where the refit leaves no more than a sound model does on any joint, counted as the report
 /// counts it: `unknown` otherwise.
-fn honest(verdict: Verdict, refit: &[JointGap]) -> Verdict {
+fn honest(verdict: Verdict, refit: &[JointGap], data: &Data) -> Verdict {
     let left = |g: &JointGap| (g.rms / g.noise.max(1e-300)).powi(2);
-    match verdict == Verdict::NoGap && refit.iter().any(|g| left(g) > T.gap.left) {
+    let too_much = |(j, g): (usize, &JointGap)| left(g) > T.gap.left * data.allowance(j);
+    match verdict == Verdict::NoGap && refit.iter().enumerate().any(too_much) {
         true => Verdict::Unknown,
         false => verdict,
-    }
-}
-
-/// The variance of the window beyond plus and minus one sample, from an estimate: that of an instant where the
-/// estimate is nearer to it.
-fn window(found: f64) -> f64 {
-    match found < -0.5 * T.window.instant {
-        true => -T.window.instant,
-        false => found.clamp(0.0, T.window.widest),
     }
 }

@@ -90,6 +90,8 @@ pub struct Noise {
     pub std: f64,
     /// origin
     pub source: Source,
+    /// whether there was next to none, and a share of the torque stands for it
+    pub assumed: bool,
     /// power that unresolved acceleration adds, in units of the noise variance
     pub excess: f64,
 }
@@ -153,11 +155,13 @@ impl Noise {
         self.filter = predictor(&self.torque);
     }
 
-    /// White noise of `least`, N m or N, in its place where there is next to none.
-    pub fn at_least(&mut self, least: f64) {
-        if self.std >= T.noise.none * least || self.torque.is_empty() {
+    /// White noise of `least`, N m or N, in its place where there is next to none, or, where `always`, less than that.
+    pub fn at_least(&mut self, least: f64, always: bool) {
+        let enough = if always { 1.0 } else { T.noise.none };
+        if self.std >= enough * least || self.torque.is_empty() {
             return;
         }
+        self.assumed = true;
         self.torque
             .iter_mut()
             .for_each(|v| *v = v.max(least * least));
@@ -187,6 +191,7 @@ impl Noise {
             filter: Vec::new(),
             torque,
             source,
+            assumed: false,
             excess: 0.0,
         };
         noise.filter = predictor(&noise.torque);

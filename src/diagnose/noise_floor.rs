@@ -24,7 +24,7 @@ impl Data<'_> {
         if let Some(dt) = dt {
             let mut noise = Noise::from_periods(&parts, dt);
             noise.limit(self.plant.actuators()[j].torque_noise);
-            noise.at_least(self.least_noise(j));
+            noise.at_least(self.least_noise(j), self.filtered(j));
             let excess = self.position_excess(j);
             noise.with_excess(&excess);
             return noise;
@@ -38,7 +38,9 @@ impl Data<'_> {
             _ => r.torque(j),
         };
         let mut noise = Noise::from_residual(x, r.dt, T.noise.above * r.band);
-        noise.at_least(self.least_noise(j));
+        noise.at_least(self.least_noise(j), self.filtered(j));
+        let excess = self.position_excess(j);
+        noise.with_excess(&excess);
         noise
     }
 
@@ -73,15 +75,36 @@ impl Data<'_> {
         T.noise.of_torque * (power / count.max(1.0)).sqrt()
     }
 
+    /// Factor on the gap per row that a sound model may leave on an actuator: more than 1 where its encoder is coarse and
+    /// the noise a small share of the torque, for what the steps of the encoder leave is slow, and whitening takes it for
+    /// white.
+    pub(super) fn allowance(&self, j: usize) -> f64 {
+        if !self.filtered(j) {
+            return 1.0;
+        }
+        let share = T.noise.of_coarse / T.noise.of_torque;
+        let floor = share * self.least_noise(j) / self.noise[j].std;
+        floor.powi(2).max(1.0)
+    }
+
     /// Spectrum of the torque that unresolved acceleration makes.
     fn position_excess(&self, j: usize) -> Vec<f64> {
         let mut out = vec![0.0; LINES + 1];
-        let records: Vec<&Series> = self.telling().filter(|r| r.cycle.is_some()).collect();
+        let coarse = |r: &Series| r.filters.get(j).is_some_and(Option::is_some);
+        let records: Vec<&Series> = (self.telling())
+            .filter(|r| r.cycle.is_some() || coarse(r))
+            .collect();
         for r in &records {
             let variance = (self.inertia[j] * r.position_noise[j]).powi(2) / records.len() as f64;
             for (l, out) in out.iter_mut().enumerate() {
                 let f = l as f64 / (2.0 * r.dt * LINES as f64);
-                *out += variance * (2.0 * std::f64::consts::PI * f.min(T.noise.resolved)).powi(4);
+                // the model from positions that passed a filter passes it once more
+                let left = match r.filters.get(j) {
+                    Some(Some(filter)) => filter.gain(f * r.dt).powi(4),
+                    _ => 1.0,
+                };
+                let w = 2.0 * std::f64::consts::PI * f.min(T.noise.resolved);
+                *out += left * variance * w.powi(4);
             }
         }
         out
@@ -136,13 +159,20 @@ impl Data<'_> {
             if self.noise[j].source != Source::Periods {
                 let r = &self.records[0];
                 let (dt, band) = (r.dt, T.noise.above * r.band);
-                let e = self.counted_residual(j, &residual[j]);
+                // with what the filters of coarse encoders took: the noise of the channel is above them, too
+                let passed = self.torque(j);
+                let taken = self.tau[j].iter().zip(passed.iter());
+                let whole: Vec<f64> = taken
+                    .map(|(a, b)| a - b)
+                    .zip(&residual[j])
+                    .map(|(d, e)| d + e)
+                    .collect();
+                let e = self.counted_residual(j, &whole);
                 if !e.is_empty() {
                     self.noise[j] = Noise::from_residual(&e, dt, band);
-                    let least = self.least_noise(j);
-                    self.noise[j].at_least(least);
+                    let (least, coarse) = (self.least_noise(j), self.filtered(j));
+                    self.noise[j].at_least(least, coarse);
                 }
-                continue;
             }
             let mut seen = vec![0.0; LINES + 1];
             let mut weight = 0.0;
@@ -157,13 +187,11 @@ impl Data<'_> {
                 weight += counts;
             }
             let possible = self.position_excess(j);
+            let about = if self.filtered(j) { 1 } else { T.noise.excess };
             let excess: Vec<f64> = (0..=LINES)
                 .map(|l| {
                     // median of neighbours: a line of its own is a gap, not noise
-                    let (lo, hi) = (
-                        l.saturating_sub(T.noise.excess),
-                        (l + T.noise.excess).min(LINES),
-                    );
+                    let (lo, hi) = (l.saturating_sub(about), (l + about).min(LINES));
                     let mut near: Vec<f64> =
                         seen[lo..=hi].iter().map(|v| v / weight.max(1.0)).collect();
                     near.sort_by(f64::total_cmp);

@@ -6,8 +6,14 @@
 
 use super::column::Column;
 use super::data::Data;
+use super::noise::ORDER;
 use super::thresholds::THRESHOLDS as T;
-use super::window::sign;
+use super::window::{fine, sign};
+use crate::plant;
+use crate::robot::JointTerm;
+
+/// Name of the nuisance columns of reversals.
+const REVERSAL: &str = "reversal";
 
 impl Data<'_> {
     /// What a log of any robot may have without being at odds with its model: reversals of friction
@@ -30,18 +36,140 @@ impl Data<'_> {
             let counted = self.counted(j);
             let kept = self.weights[j].iter_mut().zip(&counted);
             kept.for_each(|(w, m)| *w *= m);
-            let sharp = T.reversals.sharp * self.speed[j];
-            // tanh of three widths: any rounding in between is close to a sum of them
-            for wide in T.reversals.rounded.map(|w| w * self.speed[j]) {
-                let column = self.own(j, |_, v| sign(v, wide) - sign(v, sharp));
-                nuisances.push((
-                    "reversal",
-                    Column::on(j, column),
-                    T.reversals.rounding * coulomb,
-                ));
+            for column in self.rounded(j) {
+                let spread = T.reversals.rounding * coulomb;
+                nuisances.push((REVERSAL, Column::on(j, column), spread));
             }
         }
+        nuisances.extend(self.between_samples());
         self.add_nuisances(&nuisances);
+    }
+
+    /// A log without noise is a simulator's: its damping takes a velocity from within a step, its log one at the end.
+    fn between_samples(&self) -> Vec<(&'static str, Column, f64)> {
+        let actuators = self.plant.actuators().into_iter().enumerate();
+        let damped = actuators.filter(|(j, a)| self.noise[*j].assumed && a.terms[1] != 0.0);
+        damped
+            .map(|(j, a)| {
+                let change = self.each(|r, _| {
+                    let step = T.window.within * r.dt * a.terms[1];
+                    r.acceleration(j).iter().map(|v| step * v).collect()
+                });
+                ("step", Column::on(j, change), 1.0)
+            })
+            .collect()
+    }
+
+    /// What a less sharp reversal changes of the sign of the friction of actuator `j`: tanh of three widths, as any
+    /// rounding in between is close to a sum of them.
+    fn rounded(&self, j: usize) -> [Vec<f64>; 3] {
+        let sharp = T.reversals.sharp * self.speed[j];
+        T.reversals.rounded.map(|w| {
+            let wide = w * self.speed[j];
+            self.dry(j, |_, v| sign(v, wide) - sign(v, sharp))
+        })
+    }
+
+    /// Coulomb columns with the sign averaged as the torque is.
+    pub(super) fn coulomb(&mut self) {
+        for (j, c) in self.dry_parameters() {
+            let column = self.dry(j, |_, v| sign(v, T.reversals.sharp * self.speed[j]));
+            self.w[j].write(c).copy_from_slice(&column);
+        }
+    }
+
+    /// A function of the position of one actuator and of the velocity that its dry friction feels, averaged as by
+    /// [`Data::own`].
+    pub fn dry(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        self.led(j, self.lead, f)
+    }
+
+    /// The same with a velocity `q̇ + T q̈` of another `lead` `T`.
+    pub(super) fn led(&self, j: usize, lead: f64, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        if lead == 0.0 {
+            return self.own(j, f);
+        }
+        let mut out = Vec::with_capacity(self.rows());
+        for r in &self.records {
+            let ((q, v), a) = (r.state(j), r.acceleration(j));
+            let felt: Vec<f64> = v.iter().zip(a).map(|(v, a)| v + lead * a).collect();
+            fine(q, &felt, a, r.dt, &f, &mut out);
+        }
+        out
+    }
+
+    /// The parameters that stand for dry friction of an actuator's own, each with its actuator.
+    pub(super) fn dry_parameters(&self) -> Vec<(usize, usize)> {
+        let actuated = self.plant.actuated();
+        let of = |c: usize| match self.parameters[c].kind {
+            plant::Column::Term {
+                joint,
+                term: JointTerm::Coulomb,
+            } => Some((actuated.iter().position(|a| *a == joint)?, c)),
+            _ => None,
+        };
+        match self.plant.redundant() {
+            // friction of one drive acts on others, too: left as it is
+            true => Vec::new(),
+            false => (0..self.parameters.len()).filter_map(of).collect(),
+        }
+    }
+
+    /// Dry friction of every actuator's own with parameters `phi`, N m or N; 0 where one drive's acts on others.
+    fn dry_friction(&self, phi: &[f64]) -> Vec<f64> {
+        let actuators = self.plant.actuators();
+        let mut all: Vec<f64> = match self.plant.redundant() {
+            true => vec![0.0; actuators.len()],
+            false => actuators.iter().map(|a| a.terms[2]).collect(),
+        };
+        self.dry_parameters()
+            .into_iter()
+            .for_each(|(j, c)| all[j] = phi[c]);
+        all
+    }
+
+    /// What dry friction of parameters `phi` changes if it reverses `by` seconds earlier than it is taken to.
+    pub(super) fn earlier(&self, phi: &[f64], by: f64) -> Column {
+        let dry = self.dry_friction(phi).into_iter().enumerate();
+        let rows = dry.filter(|(_, f)| *f != 0.0).map(|(j, friction)| {
+            let change = self.change_of_sign(j, self.lead, self.lead + by);
+            (j, change.map(|c| friction * c).collect())
+        });
+        Column {
+            rows: rows.collect(),
+        }
+    }
+
+    /// What the sign of the dry friction of actuator `j` changes between two leads.
+    fn change_of_sign(&self, j: usize, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let sharp = T.reversals.sharp * self.speed[j];
+        let of = |lead: f64| self.led(j, lead, |_, v| sign(v, sharp));
+        of(to).into_iter().zip(of(from)).map(|(a, b)| a - b)
+    }
+
+    /// Takes dry friction to reverse `lead` seconds before the velocity does.
+    pub(super) fn reverse_early(&mut self, lead: f64) {
+        if lead == self.lead {
+            return;
+        }
+        let parameters: Vec<usize> = self.dry_parameters().iter().map(|(j, _)| *j).collect();
+        let stated: Vec<f64> = self.plant.actuators().iter().map(|a| a.terms[2]).collect();
+        let known = |j: &usize| stated[*j] != 0.0 && !parameters.contains(j);
+        for j in (0..self.joints()).filter(known) {
+            let change: Vec<f64> = self.change_of_sign(j, self.lead, lead).collect();
+            let rows = self.known[j].iter_mut().zip(change);
+            rows.for_each(|(k, c)| *k += stated[j] * c);
+        }
+        self.lead = lead;
+        self.coulomb();
+        let mut slots = (0..self.parameters.len()).filter(|c| self.parameters[*c].name == REVERSAL);
+        let slots: Vec<usize> = slots.by_ref().collect();
+        let rounded = (0..self.joints())
+            .filter(|j| stated[*j] != 0.0)
+            .flat_map(|j| self.rounded(j).map(|column| (j, column)));
+        for ((j, column), c) in rounded.collect::<Vec<_>>().into_iter().zip(slots) {
+            self.w[j].write(c).copy_from_slice(&column);
+        }
     }
 
     /// Weights `1/√(1 + (κ F_c/σ)² b)` of the rows of an actuator: where its velocity changes sign
@@ -68,9 +196,20 @@ impl Data<'_> {
             let of = |(d, v): (&f64, &f64)| {
                 let b = (2.0 - d / near).clamp(0.0, 1.0);
                 let c = (2.0 - v.abs() / blind.max(1e-300)).clamp(0.0, 1.0);
-                1.0 / (1.0 + doubt * b + open * c).sqrt()
+                doubt * b + open * c
             };
-            away.iter().zip(v).map(of).collect()
+            let mut doubts: Vec<f64> = away.iter().zip(v).map(of).collect();
+            if let Some(Some(filter)) = r.filters.get(j) {
+                // an error of one sign about a reversal, as the filter of a coarse encoder leaves it
+                let roots: Vec<f64> = doubts.iter().map(|d| d.sqrt()).collect();
+                let left = filter.pass(&roots);
+                // the whitening filters still feel it after
+                let felt = |i: usize| left[i.saturating_sub(ORDER)..=i].iter();
+                doubts = (0..left.len())
+                    .map(|i| felt(i).fold(0.0f64, |m, d| m.max(d * d)))
+                    .collect();
+            }
+            doubts.iter().map(|d| 1.0 / (1.0 + d).sqrt()).collect()
         })
     }
 

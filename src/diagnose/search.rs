@@ -182,8 +182,13 @@ pub fn best_shape(
 ) -> Option<Candidate> {
     let effect = effects[which].as_ref();
     let grid = effect.shapes(cx, place);
-    // the best that a machine can have, and the best that none can
-    type Best = [Option<(f64, Shape, Option<String>)>; 2];
+    // the best that a machine can have, and the best that none can: by what they gain less what their columns cost, so that
+    // a form with more of them takes the place of a plain one only where it has a use
+    type Best = [Option<(f64, f64, Shape, Option<String>)>; 2];
+    let worth = |gain: f64, projected: &Projected| {
+        let live = (0..projected.z.len()).filter(|k| projected.raw[(*k, *k)] > 0.0);
+        gain - T.rivals.price * live.count() as f64
+    };
     let best_of = |shapes: &[Shape]| -> Option<Best> {
         let columns = |s: &Shape| effect.columns(cx, place, s, true);
         let sets: Vec<_> = shapes.iter().map(columns).collect();
@@ -202,8 +207,9 @@ pub fn best_shape(
             let able = gain.is_finite() && effect.plausible(cx, place, shape, eta);
             let why = effect.impossible(cx, place, shape, eta).filter(|_| able);
             let of = &mut best[usize::from(why.is_some())];
-            if able && of.as_ref().is_none_or(|b| gain > b.0) {
-                *of = Some((gain, shape.clone(), why));
+            let worth = worth(gain, &projected);
+            if able && of.as_ref().is_none_or(|b| worth > b.0) {
+                *of = Some((worth, gain, shape.clone(), why));
             }
         }
         Some(best)
@@ -214,10 +220,11 @@ pub fn best_shape(
         all.reduce(|a, b| if b.0 > a.0 { b } else { a })
     });
     // what no machine can have is kept only to be said
-    let gain = best.as_ref().map_or(0.0, |b| b.0);
-    let said = none.and_then(|(more, shape, why)| (more > gain).then_some(((why?, more), shape)));
+    let gain = best.as_ref().map_or(0.0, |b| b.1);
+    let said =
+        none.and_then(|(_, more, shape, why)| (more > gain).then_some(((why?, more), shape)));
     let (said, instead) = said.unzip();
-    let mut shape = best.map(|b| b.1).or(instead)?;
+    let mut shape = best.map(|b| b.2).or(instead)?;
     // between grid points
     if gain > T.shapes.refined {
         let mut top = gain;

@@ -107,7 +107,7 @@ pub fn decide(
         false => [st.total, st.above(&hold_before, false)],
     };
     let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
-    let surprising = surprise > T.hidden.surprise + T.hidden.per_parameter * free(&st);
+    let surprising = surprise > T.hidden.surprise + T.hidden.per_parameter * st.freedoms;
     // a set that cannot be told apart explains as well as its one right member
     let claimed = members.iter().any(claims);
     let verdict = match (stands_out(&st, &before) || surprising, claimed) {
@@ -125,15 +125,10 @@ pub fn decide(
     }
 }
 
-/// Parameters of the nominal model.
-fn free(st: &State) -> f64 {
-    st.evidence.data.parameters.len() as f64
-}
-
 /// Whether the gap of any joint is larger than a sound model leaves.
 fn stands_out(st: &State, gap: &[f64]) -> bool {
     let least = T.gap.sound * st.evidence.data.fitted as f64;
-    gap.iter().any(|v| *v > least)
+    gap.iter().zip(&st.allowance).any(|(v, a)| *v > least * a)
 }
 
 /// Gives the members, in the order of the set, their coefficients of the common fit.

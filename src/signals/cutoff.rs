@@ -49,7 +49,7 @@ fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
 
 /// Spectrum of a position, one-sided, units²/Hz: that of its first difference, which has no trend to
 /// leak, divided by the difference's own.
-fn spectrum_of(q: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn spectrum_of(q: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
     let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
     let (f, mut density) = welch(&difference, rate, length);
     for (f, d) in f.iter().zip(&mut density) {

@@ -6,7 +6,7 @@
 
 use super::grid::{RATE, Source, lattice, repeats, resample, thinned, third_difference};
 use super::repeats::{freedoms, means, repeat, scatter, widen};
-use super::wiener::{BAND, SMOOTH, differentiated, half_width};
+use super::wiener::{BAND, Filter, SMOOTH, differentiated, filters, half_width};
 use super::{cutoff, standstill};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
@@ -49,6 +49,8 @@ pub struct Series {
     pub position_noise: Vec<f64>,
     /// highest frequency with motion in it, Hz
     pub band: f64,
+    /// what the positions of coarse encoders passed, by actuator; empty where none is coarse
+    pub filters: Vec<Option<Filter>>,
     /// what the robot carried
     pub payload: Payload,
     /// place in the experiment file
@@ -285,6 +287,10 @@ impl Series {
             .collect();
         let cycles = cycle.map(|cycle| (cycle, free));
         let (motion, position_noise, band) = differentiated(&q, &steps, count, cycles, dt);
+        let filters = match cycle {
+            Some(_) => Vec::new(),
+            None => filters(&q, &steps, count, dt),
+        };
         let reference = reference.map(|columns| {
             let exact = vec![0.0; n];
             differentiated(&columns, &exact, count, cycles, dt).0
@@ -313,6 +319,7 @@ impl Series {
             standing,
             position_noise,
             band,
+            filters,
             payload: log.payload,
             order: 0,
             remarks,

@@ -6,6 +6,8 @@
 //! repeats exactly hides them in every period alike. Differentiation is exact and needs no
 //! filter. Otherwise the positions pass a zero-phase low-pass and central differences.
 
+use super::cutoff::spectrum_of;
+use super::fourier::{Inverse, Plan};
 use super::repeats::scatter;
 use crate::dynamics::Samples;
 use std::f64::consts::PI;
@@ -15,6 +17,12 @@ pub const BAND: f64 = 30.0;
 
 /// About where the low-pass of a motion that does not repeat cuts off, Hz.
 pub const SMOOTH: f64 = 12.0;
+
+/// Weight about [`SMOOTH`] below which an encoder is coarse.
+const RESOLVED: f64 = 0.5;
+
+/// Stretch of a record that its spectrum is averaged over, s.
+const STRETCH: f64 = 2.0;
 
 /// Fourier series of the mean period, with its derivatives, over the whole record. `steps` are
 /// the variances of the encoders' steps by actuator.
@@ -125,29 +133,129 @@ fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> (Samples, Vec<f64>
     let mut out = Samples::zeros(n, count);
     let mut noise = Vec::new();
     let half = half_width(dt);
+    let filters = filters(q, steps, count, dt);
     for j in 0..n {
         let row = &q[j * count..(j + 1) * count];
-        // moving averages shrink curvature; doing it twice and adding the difference back undoes
-        // the leading term (Kaiser & Hamming 1977)
-        let sharpen = |x: &[f64]| -> Vec<f64> {
-            let once = triangle(x, half);
-            let twice = triangle(&once, half);
-            once.iter().zip(&twice).map(|(a, b)| 2.0 * a - b).collect()
+        noise.push(variance(row, steps[j]).sqrt());
+        let clean = match &filters[j] {
+            Some(filter) => filter.pass(row),
+            None => low_pass(row, half),
         };
-        let clean = sharpen(&sharpen(row));
         let velocity = difference(&clean, dt);
         let acceleration = difference(&velocity, dt);
-        let rough: f64 = row
-            .windows(4)
-            .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))
-            .sum::<f64>()
-            / (20.0 * row.len() as f64);
-        noise.push(rough.max(steps[j]).sqrt());
         out.q[j * count..(j + 1) * count].copy_from_slice(&clean);
         out.qd[j * count..(j + 1) * count].copy_from_slice(&velocity);
         out.qdd[j * count..(j + 1) * count].copy_from_slice(&acceleration);
     }
     (out, noise, SMOOTH)
+}
+
+/// What the positions of a coarse encoder pass: every line of their spectrum `S(f)` weighted by `max(0, 1 − S_n/S(f))`
+/// (Wiener) with the density `S_n = 2 σ² Δ` of white noise of the variance `σ²`, then the low-pass of every motion that
+/// does not repeat.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    /// weights of lines from 0 to half the sampling rate, the same distance apart
+    weight: Vec<f64>,
+    /// that distance over the sampling rate
+    apart: f64,
+    /// half-width of the triangles of the low-pass, samples
+    half: usize,
+}
+
+impl Filter {
+    /// For positions that noise of this variance is on, sampled every `dt` seconds; `None` where they are resolved up to
+    /// the cut-off of the low-pass alone.
+    pub fn of(q: &[f64], variance: f64, dt: f64) -> Option<Filter> {
+        let count = q.len();
+        let length = ((STRETCH / dt) as usize).clamp(64, (count / 2).max(64));
+        let (f, density) = spectrum_of(q, 1.0 / dt, length);
+        let noise = 2.0 * variance * dt;
+        let of = |k: usize| (1.0 - noise / density[k].max(1e-300)).max(0.0);
+        // the first line is that of the trend
+        let weight: Vec<f64> = (0..f.len())
+            .map(|k| if k == 0 { 1.0 } else { of(k) })
+            .collect();
+        let line = |frequency: f64| ((frequency / f[1]).round() as usize).min(weight.len() - 1);
+        let mut about = weight[line(0.75 * SMOOTH)..=line(1.25 * SMOOTH)].to_vec();
+        about.sort_by(f64::total_cmp);
+        (about[about.len() / 2] < RESOLVED).then(|| Filter {
+            weight,
+            apart: f[1] * dt,
+            half: half_width(dt),
+        })
+    }
+
+    /// What is left of the amplitude at a frequency, over the sampling rate.
+    pub fn gain(&self, frequency: f64) -> f64 {
+        let x = PI * frequency;
+        let half = self.half as f64;
+        // a triangle is two boxes
+        let once = match x.sin() == 0.0 {
+            true => 1.0,
+            false => ((half * x).sin() / (half * x.sin())).powi(2),
+        };
+        self.weight(frequency) * (2.0 * once - once * once).powi(2)
+    }
+
+    /// The weight at a frequency, over the sampling rate.
+    fn weight(&self, frequency: f64) -> f64 {
+        let at = frequency / self.apart;
+        let (low, part) = (at.floor() as usize, at.fract());
+        let of = |k: usize| self.weight[k.min(self.weight.len() - 1)];
+        (1.0 - part) * of(low) + part * of(low + 1)
+    }
+
+    /// A signal of the same rate, passed. It is continued by its reflection in either end.
+    pub fn pass(&self, x: &[f64]) -> Vec<f64> {
+        let count = x.len();
+        if count < 3 {
+            return x.to_vec();
+        }
+        // odd about both ends: neither the signal nor its slope jumps there
+        let slope = (x[count - 1] - x[0]) / (count - 1) as f64;
+        let level = |i: usize| x[0] + slope * i as f64;
+        let mut odd: Vec<f64> = (0..count).map(|i| x[i] - level(i)).collect();
+        odd.extend((1..count - 1).rev().map(|i| level(i) - x[i]));
+        let whole = odd.len();
+        let mut lines = Plan::new(whole).spectrum(odd);
+        for (k, line) in lines.iter_mut().enumerate() {
+            *line *= self.weight(k as f64 / whole as f64) / whole as f64;
+        }
+        let back = Inverse::new(whole).signal(lines);
+        let kept: Vec<f64> = (0..count).map(|i| level(i) + back[i]).collect();
+        low_pass(&kept, self.half)
+    }
+}
+
+/// A low-pass without phase: moving averages shrink curvature; doing it twice and adding the difference back undoes the
+/// leading term (Kaiser & Hamming 1977).
+fn low_pass(x: &[f64], half: usize) -> Vec<f64> {
+    let sharpen = |x: &[f64]| -> Vec<f64> {
+        let once = triangle(x, half);
+        let twice = triangle(&once, half);
+        once.iter().zip(&twice).map(|(a, b)| 2.0 * a - b).collect()
+    };
+    sharpen(&sharpen(x))
+}
+
+/// Variance of the noise on positions, from their third differences, and no less than that of the encoder's steps.
+fn variance(q: &[f64], steps: f64) -> f64 {
+    let rough = q
+        .windows(4)
+        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2))
+        .sum::<f64>()
+        / (20.0 * q.len() as f64);
+    rough.max(steps)
+}
+
+/// What the positions of every actuator pass where the motion does not repeat and its encoder is coarse.
+pub fn filters(q: &[f64], steps: &[f64], count: usize, dt: f64) -> Vec<Option<Filter>> {
+    let of = |(row, steps): (&[f64], &f64)| match *steps > 0.0 {
+        true => Filter::of(row, variance(row, *steps), dt),
+        false => None,
+    };
+    q.chunks_exact(count).zip(steps).map(of).collect()
 }
 
 fn difference(x: &[f64], dt: f64) -> Vec<f64> {

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod coarse;
 mod controller;
 mod findings;
 mod next;

@@ -172,7 +172,7 @@ impl<'a> Context<'a> {
     /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
     pub fn sign(&self, j: usize) -> Vec<f64> {
         let width = T.reversals.sharp * self.data.speed[j];
-        self.data.own(j, |_, v| sign(v, width))
+        self.data.dry(j, |_, v| sign(v, width))
     }
 
     /// Change of the rigid-body torque of all actuators when coordinate `j` moves by a small `δ`

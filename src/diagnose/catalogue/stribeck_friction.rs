@@ -44,7 +44,7 @@ impl Effect for StribeckFriction {
         let rise = |v: f64| {
             crate::diagnose::window::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
         };
-        vec![Column::on(j, cx.data.own(j, |_, v| rise(v)))]
+        vec![Column::on(j, cx.data.dry(j, |_, v| rise(v)))]
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {

@@ -22,6 +22,19 @@ impl Evidence<'_> {
             .collect()
     }
 
+    /// Freedoms of the nominal model that the records settle, `tr(1 − A⁻¹)` in units of the prior: what the penalty of the
+    /// prior is expected to be for parameters that were drawn from it (MacKay 1992).
+    pub fn freedoms(&self) -> f64 {
+        let p = self.d.len();
+        let mut inverse = Mat::<f64>::identity(p, p);
+        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+            self.l.as_ref(),
+            inverse.as_mut(),
+            faer::Par::Seq,
+        );
+        p as f64 - inverse.squared_norm_l2()
+    }
+
     /// Standard deviation of parameter `i` beside all others, from records and prior, for noise of variance 1.
     pub fn std(&self, i: usize) -> f64 {
         let mut x = Mat::<f64>::zeros(self.d.len(), 1);
@@ -81,7 +94,7 @@ impl Evidence<'_> {
     pub fn unwhitened(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let before = residual.par_iter().enumerate();
         let before = before.map(|(j, e)| self.data.unwhiten(j, e)).collect();
-        self.data.silenced(before)
+        self.data.told(self.data.silenced(before))
     }
 
     /// What the nominal model leaves of the torque beside a fitted set, by actuator, N m or N; zero

@@ -39,8 +39,9 @@ impl<'a> Evidence<'a> {
         let r: Vec<Vec<f64>> = (0..n)
             .into_par_iter()
             .map(|j| {
-                let model = data.windowed(&nominal[j]);
-                let raw: Vec<f64> = data.tau[j].iter().zip(&model).map(|(a, b)| a - b).collect();
+                let model = data.shown(j, &nominal[j]);
+                let measured = data.torque(j);
+                let raw: Vec<f64> = measured.iter().zip(&model).map(|(a, b)| a - b).collect();
                 data.whiten(j, &raw)
             })
             .collect();

@@ -184,6 +184,7 @@ impl Trial<'_> {
             standing,
             position_noise: vec![0.0; n],
             band: T.next.band,
+            filters: Vec::new(),
             payload: Payload::None,
             order: 0,
             remarks: Vec::new(),

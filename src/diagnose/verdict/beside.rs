@@ -79,8 +79,7 @@ impl<'a> Beside<'a> {
         let little = (T.hidden.of_gain * out.gain)
             .max(T.hidden.of_entry * st.scale(set.len()) * T.entry.gain * rows);
         // nor is a residual that hardly falls, where most of what is unlikely of the parameters goes
-        let free = st.evidence.data.parameters.len() as f64;
-        let unlikely = (surprise_without - free).max(1.0);
+        let unlikely = (surprise_without - st.freedoms).max(1.0);
         let lives_there = out.explains() < T.hidden.of_residual
             && out.fall > T.confidence.parameters.centre * unlikely;
         out.frozen = st.may_hide(set, i)
@@ -135,9 +134,8 @@ impl<'a> Beside<'a> {
     /// Share that it takes away of the gap on its joints or, where it is hidden, of the unlikeliness of the
     /// parameters.
     pub fn share(&self) -> f64 {
-        let free = self.st.evidence.data.parameters.len() as f64;
         match self.frozen {
-            true => self.fall / (self.surprise_without - free).max(1.0),
+            true => self.fall / (self.surprise_without - self.st.freedoms).max(1.0),
             false => self.share_of(&self.without, self.after, self.fitted()),
         }
     }
@@ -177,8 +175,7 @@ impl<'a> Beside<'a> {
 
     /// What stays unlikely of the parameters.
     pub fn unlikely_left(&self) -> f64 {
-        let free = self.st.evidence.data.parameters.len() as f64;
-        (self.surprise_after - free).max(0.0)
+        (self.surprise_after - self.st.freedoms).max(0.0)
     }
 
     /// Share of the whole gap that it explains: of the frozen model's, where it hides in the parameters.

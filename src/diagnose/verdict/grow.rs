@@ -19,20 +19,36 @@ pub fn forwards(st: &State, list: &[Candidate], progress: &dyn Fn(&str)) -> Vec<
             2 => "third effect",
             _ => "fourth effect",
         });
-        let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
-        let mut next = challengers(st, list, &beside, T.search.forward);
-        next.retain(|c| !set.iter().any(|s| s.same(c)));
-        // one that gains most need not be one that holds: the others have their turn
-        let tried = next.into_iter().take(T.search.tried).enumerate();
-        let grown = tried
-            .filter_map(|(i, candidate)| grown(st, list, &set, candidate, i == 0))
-            .next();
+        // where none does, those that hide in the parameters are looked at apart: others that gain more may crowd them out
+        let grown = larger(st, list, &set).or_else(|| larger(st, &hiding(st, list, &set), &set));
         match grown {
             Some(grown) => set = grown,
             None => break,
         }
     }
     set
+}
+
+/// The set with the best of some candidates that can be accepted.
+fn larger(st: &State, list: &[Candidate], set: &[Candidate]) -> Option<Vec<Candidate>> {
+    let beside: Vec<&Projected> = set.iter().map(|c| &c.projected).collect();
+    let mut next = challengers(st, list, &beside, T.search.forward);
+    next.retain(|c| !set.iter().any(|s| s.same(c)));
+    // one that gains most need not be one that holds: the others have their turn
+    let tried = next.into_iter().take(T.search.tried).enumerate();
+    tried
+        .filter_map(|(i, candidate)| grown(st, list, set, candidate, i == 0))
+        .next()
+}
+
+/// Candidates that hide in the parameters, where these stay farther from the robot file than a set explains.
+fn hiding(st: &State, list: &[Candidate], set: &[Candidate]) -> Vec<Candidate> {
+    let (fit, residual) = st.fit(set);
+    let unlikely = st.surprise(&fit, &residual) > T.hidden.surprise + st.freedoms;
+    let kept = list
+        .iter()
+        .filter(|c| unlikely && st.effects[c.effect].hides());
+    kept.cloned().collect()
 }
 
 /// Lets a rival that does better beside the others take the place of a member.

@@ -19,6 +19,10 @@ pub struct State<'a> {
     pub floor: f64,
     /// gap of the refitted nominal model above that, fitted records
     pub total: f64,
+    /// what the prior expects its own penalty to be
+    pub freedoms: f64,
+    /// factor on the gap per row that a sound model may leave, by actuator
+    pub allowance: Vec<f64>,
 }
 
 impl<'a> State<'a> {
@@ -34,6 +38,10 @@ impl<'a> State<'a> {
             effects,
             floor: 0.0,
             total: 0.0,
+            freedoms: evidence.freedoms(),
+            allowance: (0..evidence.data.joints())
+                .map(|j| evidence.data.allowance(j))
+                .collect(),
         };
         let rows = evidence.data.fitted as f64;
         let before = st.gap(&st.fit(&[]).1, true);
@@ -128,7 +136,12 @@ impl State<'_> {
         };
         let seen = (over(without) - over(with)) / over(without).max(1e-9);
         let explains = (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9);
-        let there = without.iter().fold(0.0f64, |m, v| m.max(*v)) / rows;
+        let allowed = |j: &usize| without[*j] / self.allowance[*j];
+        let all: Vec<usize> = (0..without.len()).collect();
+        // a coarse encoder leaves something on any joint
+        let coarse = self.allowance.iter().any(|a| *a > 1.0);
+        let counted = if coarse { &joints } else { &all };
+        let there = counted.iter().map(allowed).fold(0.0, f64::max) / rows;
         let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
         let ringing = match self.effects[c.effect].rings(&c.shape) {
             true => T.matters.ringing.above(own),

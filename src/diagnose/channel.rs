@@ -1,0 +1,188 @@
+//! What stands between a torque and its place in the log: the window of the torque channel, the time at which a
+//! simulator's friction reverses, and the filter that positions of coarse encoders have passed.
+//!
+//! A coarse encoder (12 bits, say) does not resolve a motion up to the cut-off of the derivatives. Its positions pass a
+//! Wiener filter `H` ([`crate::signals::wiener::Filter`]), so `M H q̈` lacks what the torque and the sign of the velocity
+//! still have. Torque and model alike pass the same `H`, as in the parallel filtering of an identification (Khalil &
+//! Dombre 2002, ch. 12).
+//!
+//! A simulator regularises dry friction by a velocity and an acceleration, so that friction opposes `q̇ + T q̈` and
+//! reverses before the velocity does; MuJoCo's `solref` gives `T` of about 10 ms. With `S(T)` the torque of dry friction at
+//! a lead `T`, `c` the second and `s` the first difference of the modelled torque,
+//!
+//! ```text
+//! τ − W φ = w c/2 + d s + κ (S(T + h) − S(T))        T ← T + κ h
+//! ```
+
+use super::column::Column;
+use super::data::Data;
+use super::evidence::Evidence;
+use super::thresholds::THRESHOLDS as T;
+use crate::signals::series::Series;
+use std::borrow::Cow;
+
+/// What the records say of it.
+pub struct Channel {
+    /// variance of the window beyond plus and minus one sample, samples squared
+    pub window: f64,
+    /// time by which dry friction reverses before the velocity does, s
+    pub lead: f64,
+    /// parameters of the refitted nominal model
+    pub phi: Vec<f64>,
+}
+
+impl Channel {
+    /// From records with the window and the lead found so far.
+    pub fn of(data: &Data) -> Channel {
+        let e = Evidence::new(data, 1.0);
+        let phi = e.parameters(&[], &e.fit(&[]));
+        let model = data.model_torque(&phi);
+        let curved = data.curvature(&model);
+        let joints = || 0..data.joints();
+        let coarse = joints().any(|j| data.filtered(j));
+        let assumed = joints().any(|j| data.noise[j].assumed);
+        // positions that noise is on bend where the torque does not: no window can be seen then
+        let found = match coarse {
+            true => 0.0,
+            false => e.fit(&[&e.project(std::slice::from_ref(&curved))]).eta[0],
+        };
+        let mut lead = data.lead;
+        // no machine's friction does that: looked for where a log may be a simulator's
+        if (coarse || assumed) && !data.plant.closed() {
+            let step = T.reversals.step;
+            let all = e.project(&[curved, data.slope(&model), data.earlier(&phi, step)]);
+            let fit = e.fit(&[&all]);
+            let more = (lead + step * fit.eta[2]).clamp(0.0, T.reversals.longest);
+            let sure = step * fit.covariance[2][2].max(0.0).sqrt();
+            if more > T.reversals.shortest.max(T.reversals.sure * sure) {
+                lead = more;
+            }
+        }
+        Channel {
+            window: window(data.window + found),
+            lead,
+            phi,
+        }
+    }
+}
+
+/// The variance of the window beyond plus and minus one sample, from an estimate: that of an instant where the
+/// estimate is nearer to it.
+fn window(found: f64) -> f64 {
+    match found < -0.5 * T.window.instant {
+        true => -T.window.instant,
+        false => found.clamp(0.0, T.window.widest),
+    }
+}
+
+impl Data<'_> {
+    /// A modelled signal of all records as the torque channel would show it, whitened.
+    pub fn modelled(&self, j: usize, x: &[f64]) -> Vec<f64> {
+        if self.window == 0.0 && !self.filtered(j) {
+            return self.whiten(j, x);
+        }
+        self.whiten(j, &self.shown(j, x))
+    }
+
+    /// Measured torque of actuator `j`, which has passed what the positions of a coarse encoder passed: else it would hold
+    /// what no model from those positions can show.
+    pub fn torque(&self, j: usize) -> Cow<'_, [f64]> {
+        match self.filtered(j) {
+            true => Cow::Owned(self.passed(j, self.tau[j].clone())),
+            false => Cow::Borrowed(&self.tau[j]),
+        }
+    }
+
+    /// A modelled signal of all records as [`Data::torque`] would show it.
+    pub fn shown(&self, j: usize, x: &[f64]) -> Vec<f64> {
+        self.passed(j, self.windowed(x))
+    }
+
+    /// Whether the encoder of actuator `j` is coarse in any record.
+    pub(super) fn filtered(&self, j: usize) -> bool {
+        let coarse = |r: &Series| r.filters.get(j).is_some_and(Option::is_some);
+        self.records.iter().any(coarse)
+    }
+
+    /// What the filters of the positions leave of a signal.
+    fn passed(&self, j: usize, mut x: Vec<f64>) -> Vec<f64> {
+        for (k, r) in self.records.iter().enumerate() {
+            if let Some(Some(filter)) = r.filters.get(j) {
+                let span = self.span(k);
+                let piece = filter.pass(&x[span.clone()]);
+                x[span].copy_from_slice(&piece);
+            }
+        }
+        x
+    }
+
+    /// A modelled signal of all records as the torque channel would show it: passes of the kernel
+    /// `[c/2, 1 − c, c/2]` until their variances sum to the window's.
+    pub fn windowed(&self, x: &[f64]) -> Vec<f64> {
+        let passes = (self.window.abs() / T.window.pass).ceil() as usize;
+        let mut x = x.to_vec();
+        if passes == 0 {
+            return x;
+        }
+        let half = 0.5 * self.window / passes as f64;
+        for _ in 0..passes {
+            for k in 0..self.records.len() {
+                let x = &mut x[self.span(k)];
+                let last = x.len() - 1;
+                let mut before = x[0];
+                for i in 0..=last {
+                    let (here, after) = (x[i], x[(i + 1).min(last)]);
+                    x[i] = here + half * (before - 2.0 * here + after);
+                    before = here;
+                }
+            }
+        }
+        x
+    }
+
+    /// Second differences of a modelled torque: what a wider window would change.
+    pub fn curvature(&self, model: &[Vec<f64>]) -> Column {
+        let rows = model.iter().enumerate().map(|(j, model)| {
+            let mut out = vec![0.0; self.rows()];
+            for k in 0..self.records.len() {
+                let span = self.span(k);
+                for i in span.start + 1..span.end - 1 {
+                    out[i] = 0.5 * (model[i - 1] - 2.0 * model[i] + model[i + 1]);
+                }
+            }
+            (j, out)
+        });
+        Column {
+            rows: rows.collect(),
+        }
+    }
+
+    /// First differences of a modelled torque: what a stamp that is late by a sample would change.
+    pub fn slope(&self, model: &[Vec<f64>]) -> Column {
+        let rows = model.iter().enumerate().map(|(j, model)| {
+            let mut out = vec![0.0; self.rows()];
+            for k in 0..self.records.len() {
+                let span = self.span(k);
+                for i in span.start + 1..span.end - 1 {
+                    out[i] = 0.5 * (model[i + 1] - model[i - 1]);
+                }
+            }
+            (j, out)
+        });
+        Column {
+            rows: rows.collect(),
+        }
+    }
+
+    /// Residuals of all records where rows of a coarse encoder count as much as they tell: near reversals it does not say
+    /// when a joint turned, and its filter spreads that.
+    pub fn told(&self, mut residual: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        for (j, row) in residual.iter_mut().enumerate() {
+            if self.filtered(j) {
+                let rows = row.iter_mut().zip(&self.weights[j]);
+                rows.for_each(|(v, w)| *v *= w);
+            }
+        }
+        residual
+    }
+}
