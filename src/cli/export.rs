@@ -5,7 +5,8 @@ use excite::controller::{Card, Column, Course, FORMATS, Leg, Options, Playback, 
 use excite::export::{self, Model, write};
 use excite::mechanism::bundled as parallel;
 use excite::output::write_atomic;
-use excite::robot::{Motion, bundled};
+use excite::robot::bundled;
+use excite::robot::parts::Motion;
 use excite::trajectory::Trajectory;
 use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write as _;

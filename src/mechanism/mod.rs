@@ -45,25 +45,28 @@ mod motion_file;
 #[doc(hidden)]
 pub mod parallelogram;
 pub(crate) mod parameters;
+pub mod parts;
 mod reach;
 mod regressor;
 #[doc(hidden)]
 pub mod scalar;
 mod singularity;
+mod source;
 mod states;
 pub(crate) mod task;
 mod torque;
 #[doc(hidden)]
 pub mod tree;
 
-pub use certificate::MechanismCertificate;
+pub(crate) use certificate::MechanismCertificate;
 #[doc(hidden)]
 pub use certificate::PosePeak;
 #[doc(hidden)]
 pub use forward::Solution;
-pub use geometry::{ClosedForm, Coordinates, Kinematics, Segment};
+pub(crate) use geometry::Segment;
 #[doc(hidden)]
 pub use geometry::{Cone, Geometry, Path};
+pub use geometry::{Coordinates, Kinematics};
 #[doc(hidden)]
 pub use gradients::TaskDerivatives;
 pub(crate) use gradients::rounded_sign;
@@ -71,55 +74,23 @@ pub(crate) use gradients::rounded_sign;
 pub use margins::{Margins, PoseKind, PoseUse};
 #[doc(hidden)]
 pub use motion::MechanismMotion;
-pub use motion::MechanismWorkspace;
+pub(crate) use motion::MechanismWorkspace;
 pub(crate) use motion_file::read_joint_motion;
 #[doc(hidden)]
 pub use parameters::Parameters;
-pub use parameters::{Group, Pattern};
-pub use scalar::{Pack, Scalar};
+pub(crate) use parameters::{Group, Pattern};
+pub use scalar::Scalar;
 #[doc(hidden)]
 pub use singularity::{SINGULAR, Singularity, Spread};
+pub(crate) use source::Source;
 #[doc(hidden)]
 pub use task::PlatformMotion;
-pub use task::Task;
-pub use tree::{Builder, Place};
+pub(crate) use task::Task;
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Column, Inertia, Joint, JointTerm, Limits, Motion, Robot};
-use loops::Closure;
 use std::sync::Arc;
-
-/// Where a mechanism comes from: what a writer of robot files must know of it.
-#[derive(Debug, Clone)]
-pub enum Source {
-    /// `mechanism = "gough-stewart"`
-    GoughStewart,
-    /// `mechanism = "h4"`
-    H4,
-    /// `mechanism = "delta"`
-    Delta,
-    /// `mechanism = "loops"`: a tree with these closures
-    Loops(Vec<Closure>),
-    /// this mechanism, its actuators in place of its platform ([`Mechanism::in_actuators`])
-    InActuators(Box<Mechanism>),
-    /// kinematics in code, with a name for messages: no file format stands for it
-    Code(String),
-}
-
-impl Source {
-    /// `gough-stewart`, `h4`, `delta`, `loops`, or the name of what was written in code.
-    pub fn name(&self) -> &str {
-        match self {
-            Source::GoughStewart => "gough-stewart",
-            Source::H4 => "h4",
-            Source::Delta => "delta",
-            Source::Loops(_) => "loops",
-            Source::InActuators(platform) => platform.source.name(),
-            Source::Code(name) => name,
-        }
-    }
-}
 
 /// What a mechanism is put together from.
 #[derive(Debug)]

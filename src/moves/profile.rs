@@ -78,6 +78,21 @@ pub struct Peaks {
     pub jerk: f64,
 }
 
+/// What one coordinate does during a move.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct JointPeaks {
+    /// its name
+    pub joint: String,
+    /// exact extrema over all time
+    #[serde(flatten)]
+    pub peaks: Peaks,
+    /// share of the full limit of velocity, acceleration and jerk that is used, assumed limits included
+    pub used: [f64; 3],
+    /// share that it exceeds at no time of the velocity that its position leaves; `None` without such a limit
+    pub velocity_by_position: Option<f64>,
+}
+
 impl Profile {
     /// Phases `(length, jerk)` one after the other from a state. Where they miss the target by
     /// rounding, the jerks are moved by the least amount that meets it: least `∫ δj² dt`, a linear

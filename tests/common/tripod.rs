@@ -2,12 +2,12 @@
 //! platform that translates (a linear Delta). With four rails it is redundantly actuated.
 
 use excite::Result;
+use excite::mechanism::parts::{ClosedForm, Group, Pattern, Segment, Source, Task};
 use excite::mechanism::scalar::Scalar;
 use excite::mechanism::tree::{Builder, Place};
-use excite::mechanism::{
-    ClosedForm, Coordinates, Group, Kinematics, Mechanism, Pattern, Segment, Setup, Source, Task,
-};
-use excite::robot::{JointTerm, Motion};
+use excite::mechanism::{Coordinates, Kinematics, Mechanism, Setup};
+use excite::robot::JointTerm;
+use excite::robot::parts::Motion;
 use nalgebra::{Matrix3, Vector3};
 
 #[derive(Debug, Clone)]

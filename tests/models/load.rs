@@ -7,9 +7,10 @@ use crate::common::parallel::{matrix, numbers, vector};
 use crate::common::shared::checks;
 use excite::dynamics::Samples;
 
+use excite::load::parts::Parameters;
 use excite::load::two_step::PlatformSample;
-use excite::load::{Identified, Loaded, Parameters, Settings, from_records};
-use excite::log::{Payload, Purpose};
+use excite::load::{Identified, Loaded, Settings, from_records};
+use excite::log::parts::{Payload, Purpose};
 use excite::plant::Plant;
 use excite::robot::Inertia;
 use excite::signals::{Decimator, Prepared};

@@ -1,11 +1,12 @@
 //! Moves against their limits, against another planner, and among walls; the rehearsal table.
 
 use excite::collision::scene::{Obstacle, Pair, Partner, Scene, Volume, poses};
-use excite::moves::{Move, SPEEDS, Settings, State, rehearse};
+use excite::moves::{Move, Rehearsal, Settings, State, rehearse};
 use excite::robot::JointTerm;
 use excite::robot::{Limits, Robot};
 use excite::solid::Shape;
-use excite::trajectory::{Basis, Ends, Fourier, Series, Trajectory, extrema, samples};
+use excite::trajectory::parts::Ends;
+use excite::trajectory::{Basis, Fourier, Series, Trajectory, extrema, samples};
 use excite::{Error, Plant};
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
@@ -525,9 +526,9 @@ fn the_rehearsal_balances_power_and_counts_bytes() {
     let fourier = motion(&robot, &limits(&plant), 0.9, &mut rng);
     let mut trajectory = Trajectory::new(&robot, fourier);
     trajectory.periods = 2;
-    let table = rehearse(&plant, &trajectory, 250.0, &SPEEDS).unwrap();
+    let table = rehearse(&plant, &trajectory, 250.0, &Rehearsal::SPEEDS).unwrap();
     assert_eq!(table.speeds.len(), 3);
-    for (s, share) in table.speeds.iter().zip(SPEEDS) {
+    for (s, share) in table.speeds.iter().zip(Rehearsal::SPEEDS) {
         let through: f64 = s.joints.iter().map(|l| l.mean_power).sum::<f64>() * s.seconds / 2.0;
         assert!(s.work.abs() < 1e-10 * through, "{} of {through}", s.work);
         assert!((s.seconds - trajectory.duration() / share).abs() < 1e-9);

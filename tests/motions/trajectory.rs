@@ -1,9 +1,11 @@
 //! Trajectories against whole robots: limits and torque bounds.
 
-use excite::robot::{Body, Inertia, Joint, Limits, Motion, Prior, Robot};
+use excite::robot::parts::{Motion, Prior};
+use excite::robot::{Body, Inertia, Joint, Limits, Robot};
 use excite::trajectory::certificate::Kind;
 use excite::trajectory::jets::{Jet, Norms};
-use excite::trajectory::{Basis, Ends, Fourier, Grid, Series, certify, torque_certificate};
+use excite::trajectory::parts::{Ends, Grid};
+use excite::trajectory::{Basis, Fourier, Series, certify, torque_certificate};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};

@@ -399,7 +399,7 @@ fn mistakes_are_named_with_their_line() {
     // friction of a passive joint is a column of its own
     let with = format!("{hexapod}{twice}identify = [\"viscous\"]\n");
     let m = Mechanism::from_toml_str(&with, "robot.toml").unwrap();
-    let known = |p: &excite::plant::Parameter| p.name == "leg2_beta.viscous";
+    let known = |p: &excite::robot::parts::Parameter| p.name == "leg2_beta.viscous";
     assert!(m.parameters.list.iter().any(|p| known(p) && p.value == 0.1));
 }
 

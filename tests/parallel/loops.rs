@@ -5,12 +5,15 @@ use crate::common::five_bar::URDF;
 use crate::common::parallel::{check_at_100_khz, delta, h4, hexapod, reference, states};
 use crate::common::rng;
 use excite::Plant;
-use excite::design::{Condition, Settings, design};
+use excite::design::parts::Condition;
+use excite::design::{Settings, design};
 use excite::dynamics::{Isa, Samples};
 use excite::identifiability::assess;
 use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
-use excite::mechanism::{Mechanism, MechanismWorkspace, TaskDerivatives};
-use excite::trajectory::{Space, Trajectory, certify};
+use excite::mechanism::parts::MechanismWorkspace;
+use excite::mechanism::{Mechanism, TaskDerivatives};
+use excite::trajectory::parts::Space;
+use excite::trajectory::{Trajectory, certify};
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
 use std::path::Path;
@@ -536,7 +539,9 @@ fn the_layout_of_example_parallel_robots_is_read() {
 /// Other values written to a robot file and its URDF are the values that are read from them.
 #[test]
 fn an_identified_tree_with_loops_is_written_and_read() {
-    use excite::export::{Format, Model, mechanism, urdf::Urdf};
+    use excite::export::parts::Format;
+    use excite::export::urdf::Urdf;
+    use excite::export::{Model, mechanism};
     use excite::plant::Plant;
     let frames = "lock = { pin = 0.0 }\nactuated = [\"motor_left\", \"motor_right\"]\n\
                   [[joint]]\nname = \"motor_left\"\nidentify = [\"armature\", \"coulomb\", \"offset\"]\n\

@@ -4,17 +4,19 @@
 //! closed as a loop by Newton's method.
 
 use crate::common::compare::difference;
-use excite::design::{Condition, Settings, design};
+use excite::design::parts::Condition;
+use excite::design::{Settings, design};
 use excite::dynamics::Samples;
 use excite::identifiability::assess;
 use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
+use excite::mechanism::parts::{
+    ClosedForm, Group, MechanismWorkspace, Pattern, Segment, Source, Task,
+};
 use excite::mechanism::scalar::{Pack, Scalar};
 use excite::mechanism::tree::{Builder, Place};
-use excite::mechanism::{
-    ClosedForm, Coordinates, Group, Kinematics, Mechanism, MechanismWorkspace, Pattern, Segment,
-    Setup, Source, Task, TaskDerivatives,
-};
-use excite::robot::{Inertia, JointTerm, Limits, Motion};
+use excite::mechanism::{Coordinates, Kinematics, Mechanism, Setup, TaskDerivatives};
+use excite::robot::parts::Motion;
+use excite::robot::{Inertia, JointTerm, Limits};
 use excite::{Plant, Result};
 use nalgebra::{Matrix3, Vector3};
 

@@ -3,7 +3,8 @@
 use crate::common::parts;
 use crate::common::shared::shared;
 use excite::Plant;
-use excite::log::{Experiment, Purpose, Record};
+use excite::log::parts::Purpose;
+use excite::log::{Experiment, Record};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -3,8 +3,9 @@
 use excite::dynamics::Samples;
 use excite::plant::Plant;
 use excite::simulate::monte_carlo::monte_carlo;
+use excite::simulate::parts::{Controller, Field};
 use excite::simulate::record::{Columns, Sensors, measure, write_log};
-use excite::simulate::{Controller, Dynamics, Effects, Field, Run, Settings, simulate};
+use excite::simulate::{Dynamics, Effects, Run, Settings, simulate};
 use excite::trajectory::{Fourier, Series, Trajectory};
 use nalgebra::DVector;
 use std::process::Command;
@@ -356,7 +357,8 @@ fn a_log_is_read_back() {
     write_log(&path, false, &plant, &run, &measured, columns).unwrap();
     assert!(write_log(&path, false, &plant, &run, &measured, columns).is_err());
     let record =
-        excite::log::Record::read(&path, &plant, excite::log::Purpose::Fit, Some(2.0)).unwrap();
+        excite::log::Record::read(&path, &plant, excite::log::parts::Purpose::Fit, Some(2.0))
+            .unwrap();
     assert_eq!(record.len(), run.t.len());
     assert!(record.pose.is_some() && record.qref.is_some() && record.ddq.is_some());
     let n = run.t.len();
@@ -493,7 +495,8 @@ fn pressures_are_the_forces() {
         ..Columns::default()
     };
     write_log(&path, false, &plant, &run, &measured, columns).unwrap();
-    let record = excite::log::Record::read(&path, &plant, excite::log::Purpose::Fit, None).unwrap();
+    let record =
+        excite::log::Record::read(&path, &plant, excite::log::parts::Purpose::Fit, None).unwrap();
     assert!(record.tau.is_empty() && record.pressures.is_some());
     let forces = record.with_forces(&plant, 101_325.0).unwrap().unwrap();
     let flat: Vec<f64> = forces.tau.concat();

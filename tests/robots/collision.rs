@@ -2,7 +2,8 @@
 
 use excite::collision::clearance::{Fineness, Path, clearances};
 use excite::collision::scene::{Balls, Obstacle, Pair, Partner, Scene, Volume, poses};
-use excite::robot::{Body, Inertia, Joint, Motion, Robot};
+use excite::robot::parts::Motion;
+use excite::robot::{Body, Inertia, Joint, Robot};
 use excite::solid::{Pose, Shape, fit, formats, hull, hulls, mesh, separation};
 use nalgebra::{Rotation3, Vector3};
 

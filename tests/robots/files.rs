@@ -1,6 +1,7 @@
 //! Robot files: every bad one ends in one message that says where and what to do.
 
-use excite::robot::{JointTerm, Prior};
+use excite::robot::JointTerm;
+use excite::robot::parts::Prior;
 use excite::{Error, Robot};
 use proptest::prelude::*;
 

@@ -1,7 +1,8 @@
 //! From links and joints to moving bodies: merging, locking, mimics, order; the bundled robots.
 
 use excite::Robot;
-use excite::robot::{Inertia, Motion, bundled};
+use excite::robot::parts::Motion;
+use excite::robot::{Inertia, bundled};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
