@@ -83,6 +83,7 @@ pub mod controller;
 pub mod design;
 pub mod diagnose;
 pub mod documentation;
+mod dot;
 pub mod dynamics;
 mod error;
 pub mod export;
