@@ -66,7 +66,6 @@ pub use model::Settings;
 pub use open::open_pair;
 pub use open::{Opened, open};
 pub use result::Calibrated;
-pub(crate) use result::{GroupResult, Identified, RowResult};
 
 use crate::error::Result;
 use bench::Bench;

@@ -18,8 +18,9 @@
 //!
 //! Khalil & Guégan, IEEE Transactions on Robotics 20(4), 2004, give the same model in closed form.
 
+use super::closed_form::ClosedForm;
 use super::dimensions::{Dimensions, LEG, LegChain};
-use super::geometry::{ClosedForm, Cone, Coordinates, Kinematics, Segment};
+use super::geometry::{Cone, Coordinates, Kinematics, Segment};
 use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
 use super::task::{Task, rotation};

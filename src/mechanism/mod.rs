@@ -20,9 +20,11 @@
 
 mod actuation;
 mod actuators;
+mod batch;
 #[doc(hidden)]
 pub mod bundled;
 mod certificate;
+mod closed_form;
 mod deformed;
 #[doc(hidden)]
 pub mod delta;
@@ -82,6 +84,7 @@ pub(crate) use parameters::{Group, Pattern};
 pub use scalar::Scalar;
 #[doc(hidden)]
 pub use singularity::{SINGULAR, Singularity, Spread};
+pub use source::Setup;
 pub(crate) use source::Source;
 #[doc(hidden)]
 pub use task::PlatformMotion;
@@ -91,27 +94,6 @@ use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Column, Inertia, Joint, JointTerm, Limits, Motion, Robot};
 use std::sync::Arc;
-
-/// What a mechanism is put together from.
-#[derive(Debug)]
-pub struct Setup {
-    /// where it comes from
-    pub source: Source,
-    /// the tree
-    pub robot: Robot,
-    /// indices of the actuated coordinates, in the order of the columns of logs
-    pub actuated: Vec<usize>,
-    /// what the task coordinates are
-    pub task: Task,
-    /// kinematics
-    pub geometry: Box<dyn Geometry>,
-    /// unknown bodies; bodies in no group keep their inertia as known
-    pub groups: Vec<Group>,
-    /// task coordinates of the middle of the workspace
-    pub home: Vec<f64>,
-    /// characteristic length by which angles are turned into lengths, m
-    pub length: f64,
-}
 
 /// A closed chain. See the [module](self) documentation.
 #[derive(Debug, Clone)]

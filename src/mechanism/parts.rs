@@ -1,7 +1,8 @@
 //! What the types of the [module above](super) are made of, and what their settings choose from.
 
 pub use super::certificate::MechanismCertificate;
-pub use super::geometry::{ClosedForm, Segment};
+pub use super::closed_form::ClosedForm;
+pub use super::geometry::Segment;
 pub use super::motion::MechanismWorkspace;
 pub use super::parameters::{Group, Pattern};
 pub use super::scalar::Pack;

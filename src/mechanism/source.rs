@@ -1,7 +1,8 @@
-//! Where a mechanism comes from.
+//! Where a mechanism comes from, and what it is put together from.
 
-use super::Mechanism;
 use super::loops::Closure;
+use super::{Geometry, Group, Mechanism, Task};
+use crate::robot::Robot;
 
 /// Where a mechanism comes from: what a writer of robot files must know of it.
 #[derive(Debug, Clone)]
@@ -32,4 +33,25 @@ impl Source {
             Source::Code(name) => name,
         }
     }
+}
+
+/// What a mechanism is put together from.
+#[derive(Debug)]
+pub struct Setup {
+    /// where it comes from
+    pub source: Source,
+    /// the tree
+    pub robot: Robot,
+    /// indices of the actuated coordinates, in the order of the columns of logs
+    pub actuated: Vec<usize>,
+    /// what the task coordinates are
+    pub task: Task,
+    /// kinematics
+    pub geometry: Box<dyn Geometry>,
+    /// unknown bodies; bodies in no group keep their inertia as known
+    pub groups: Vec<Group>,
+    /// task coordinates of the middle of the workspace
+    pub home: Vec<f64>,
+    /// characteristic length by which angles are turned into lengths, m
+    pub length: f64,
 }

@@ -28,6 +28,7 @@ mod limits;
 mod load;
 mod moving;
 pub mod parts;
+mod peaks;
 mod plan;
 mod planner;
 mod profile;
@@ -37,7 +38,7 @@ mod tool;
 
 pub(crate) use guard::Least;
 pub(crate) use load::TorquePeak;
-pub(crate) use profile::JointPeaks;
+pub(crate) use peaks::JointPeaks;
 pub use rehearsal::{Rehearsal, rehearse};
 pub(crate) use tool::ToolPeak;
 

@@ -2,6 +2,6 @@
 
 pub use super::guard::Least;
 pub use super::load::TorquePeak;
-pub use super::profile::{JointPeaks, Peaks};
+pub use super::peaks::{JointPeaks, Peaks};
 pub use super::rehearsal::{Load, Speed};
 pub use super::tool::ToolPeak;
