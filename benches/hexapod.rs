@@ -2,7 +2,8 @@
 
 use excite::dynamics::{Samples, Workspace};
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart, Leg, joint_frame};
-use excite::mechanism::{MechanismMotion, MechanismWorkspace, TaskDerivatives};
+use excite::mechanism::parts::MechanismWorkspace;
+use excite::mechanism::{MechanismMotion, TaskDerivatives};
 use excite::robot::{Inertia, Limits};
 use nalgebra::{Matrix3, Vector3};
 use std::time::Instant;

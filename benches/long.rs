@@ -9,7 +9,8 @@
 
 use excite::diagnose::{Settings as Diagnosis, diagnose};
 use excite::identify::{Factor, Settings, condense, merge};
-use excite::log::{Experiment, Purpose, Record, Table};
+use excite::log::parts::Purpose;
+use excite::log::{Experiment, Record, Table};
 use excite::robot::JointTerm;
 use excite::simulate::{Sensors, Settings as Simulation, measure, simulate, to_record};
 use excite::trajectory::{Fourier, Series};

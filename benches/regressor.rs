@@ -11,7 +11,8 @@
 //! and median over the repeats.
 
 use excite::Robot;
-use excite::dynamics::{Derivatives, Isa, Samples, Tree, Workspace};
+use excite::dynamics::parts::Derivatives;
+use excite::dynamics::{Isa, Samples, Tree, Workspace};
 use excite::regressor::Regressor;
 use rand::{Rng, SeedableRng};
 use std::hint::black_box;

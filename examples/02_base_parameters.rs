@@ -1,6 +1,7 @@
 //! Which parameters of a robot its joint torques can tell, and why not the others.
 
-use excite::base::{BaseParameters, Identifiability};
+use excite::base::BaseParameters;
+use excite::base::parts::Identifiability;
 use excite::robot::JointTerm;
 use excite::{Error, Robot};
 

@@ -4,8 +4,10 @@
 //! `cargo run --release --example 05_estimators [RUNS]`, 20 runs a row
 
 use excite::dynamics::Samples;
-use excite::identify::{Consistency, Method, Settings, identify};
-use excite::log::{Payload, Purpose, Record};
+use excite::identify::parts::{Consistency, Method};
+use excite::identify::{Settings, identify};
+use excite::log::Record;
+use excite::log::parts::{Payload, Purpose};
 use excite::robot::JointTerm;
 use excite::{Plant, Robot};
 use rand::{Rng, SeedableRng};

@@ -4,12 +4,14 @@
 //!
 //! `cargo run --release --example 07_h4_identification`
 
-use excite::design::{Condition, Settings as Design, design};
+use excite::design::parts::Condition;
+use excite::design::{Settings as Design, design};
 use excite::identify::{Settings, identify};
-use excite::log::{Purpose, Record};
+use excite::log::Record;
+use excite::log::parts::Purpose;
 use excite::mechanism::{Mechanism, bundled};
 use excite::simulate::{Run, Sensors, Settings as Simulation, measure, simulate, to_record};
-use excite::trajectory::Ends;
+use excite::trajectory::parts::Ends;
 use excite::{Plant, Result};
 
 /// Period of the motions, s.

@@ -14,13 +14,16 @@
 //!
 //! `FOLDER/robot.toml` is the calibrated robot, `FOLDER/calibration.toml` and the pictures are what `excite calibrate` takes.
 
-use excite::calibrate::{self, Kind, Settings, Stats, Tolerances, poses, write};
-use excite::design::{Condition, Settings as Design, design};
+use excite::calibrate::parts::{Kind, Stats, Tolerances};
+use excite::calibrate::{self, Settings, poses, write};
+use excite::design::parts::Condition;
+use excite::design::{Settings as Design, design};
 use excite::identify::{self, identify};
-use excite::log::{Purpose, Record};
+use excite::log::Record;
+use excite::log::parts::Purpose;
 use excite::mechanism::bundled;
 use excite::simulate::{self, Sensors, measure, simulate, to_record};
-use excite::trajectory::Ends;
+use excite::trajectory::parts::Ends;
 use excite::{Error, Plant, Result};
 use nalgebra::{Rotation3, Vector3};
 use rand::{Rng, SeedableRng};

@@ -4,7 +4,8 @@
 //!
 //! `cargo run --release --example 09_hexapod_campaign [FOLDER]`
 
-use excite::design::{Question, design};
+use excite::design::design;
+use excite::design::parts::Question;
 use excite::diagnose::diagnose;
 use excite::identifiability::assess;
 use excite::load;
@@ -12,8 +13,9 @@ use excite::log::Experiment;
 use excite::mechanism::{Mechanism, bundled};
 use excite::moves::rehearse;
 use excite::robot::Inertia;
+use excite::simulate::parts::Field;
 use excite::simulate::record::{Columns, write_log};
-use excite::simulate::{Field, Sensors, Settings as Simulation, measure, simulate};
+use excite::simulate::{Sensors, Settings as Simulation, measure, simulate};
 use excite::trajectory::Trajectory;
 use excite::{Plant, Result};
 use std::path::{Path, PathBuf};

@@ -33,12 +33,15 @@
 //! are nearly dependent: there the columns are gone through several times, and those that leave a
 //! larger part of themselves unexplained are kept first. The order decides within a factor of two.
 
+pub mod parts;
 mod rank;
 mod states;
 mod words;
 
+pub(crate) use parts::{Identifiability, StandardParameter};
 #[doc(hidden)]
 pub use rank::{CLEAR, NEGLIGIBLE};
+#[doc(hidden)]
 pub use states::random_states;
 
 use crate::dynamics::Tree;
@@ -50,30 +53,6 @@ use rank::{
     PASSES, keep, rank, relative_singular_values, row_space, tolerance, touches_null_space,
 };
 use states::equally_fast;
-
-/// What can be said about one standard parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Identifiability {
-    /// it has a value of its own in the torques
-    Alone,
-    /// only a combination with others has
-    Combination,
-    /// it never acts on any joint
-    None,
-}
-
-/// One standard parameter, classed.
-#[derive(Debug, Clone, serde::Serialize)]
-#[non_exhaustive]
-pub struct StandardParameter {
-    /// name, `link3.mx`
-    pub name: String,
-    /// class
-    pub identifiability: Identifiability,
-    /// why, in words, where a simple reason exists; empty otherwise
-    pub reason: String,
-}
 
 /// The base parameters of a robot. See the [module](self) documentation.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -113,7 +92,8 @@ impl BaseParameters {
     ///
     /// ```
     /// use excite::Robot;
-    /// use excite::base::{BaseParameters, Identifiability};
+    /// use excite::base::BaseParameters;
+    /// use excite::base::parts::Identifiability;
     ///
     /// let base = BaseParameters::new(&Robot::load("planar2")?)?;
     /// for p in &base.standard {

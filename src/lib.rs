@@ -47,6 +47,9 @@
 //! | diagnose | [`diagnose`] | which effect the model lacks, and how far the gap shrinks with it |
 //! | documents | [`documentation`] | method, notation, files: the folder `docs/` |
 //!
+//! The page of a stage has its nouns and verbs. What these are made of (values of settings, parts of results) stands
+//! in the module `parts` of the stage, for example [`design::parts`].
+//!
 //! | symbol | meaning |
 //! |---|---|
 //! | `q, qd, qdd` | positions, velocities, accelerations (rad or m, s) |
@@ -80,6 +83,7 @@ pub mod controller;
 pub mod design;
 pub mod diagnose;
 pub mod documentation;
+mod dot;
 pub mod dynamics;
 mod error;
 pub mod export;

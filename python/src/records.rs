@@ -3,7 +3,8 @@
 use crate::call::simply;
 use crate::error::notices;
 use crate::plant::Plant;
-use excite::log::{self, Payload, Purpose, Record, Table};
+use excite::log::parts::{Payload, Purpose};
+use excite::log::{self, Record, Table};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

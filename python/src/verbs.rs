@@ -8,6 +8,7 @@ use crate::plant::Plant;
 use crate::records::Experiment;
 use crate::report::{Report, scene};
 use excite::calibrate::gap;
+use excite::calibrate::parts::Algorithm;
 use excite::cli::{export as program, identify as terms, pretty, unwritten};
 use excite::controller::{Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
 use excite::export::{Model, write};
@@ -238,9 +239,9 @@ pub fn calibrate(
     orientation: bool,
 ) -> PyResult<Report> {
     let algorithm = match algorithm.as_str() {
-        "inverse" => calibration::Algorithm::Inverse,
-        "implicit" => calibration::Algorithm::Implicit,
-        "forward" => calibration::Algorithm::Forward,
+        "inverse" => Algorithm::Inverse,
+        "implicit" => Algorithm::Implicit,
+        "forward" => Algorithm::Forward,
         other => {
             return Err(crate::error::argument(format!(
                 "algorithm is \"inverse\", \"implicit\" or \"forward\", not `{other}`"

@@ -1,5 +1,6 @@
 //! The rank of a regressor, the columns that are kept for it, and what they leave.
 
+use crate::dot::dot;
 use crate::error::{Error, Result};
 use faer::{Mat, MatRef};
 
@@ -95,7 +96,7 @@ pub(super) fn keep(
                 let mut x: Vec<f64> = (0..r.nrows()).map(|i| r[(i, j)]).collect();
                 for _ in 0..2 {
                     for e in &q {
-                        let s: f64 = e.iter().zip(&x).map(|(a, b)| a * b).sum();
+                        let s = dot(e, &x);
                         x.iter_mut().zip(e).for_each(|(x, e)| *x -= s * e);
                     }
                 }

@@ -139,7 +139,8 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Option<(Matrix3<f64>, bool)> {
     Some((u * d * vt, mirrored))
 }
 
-/// The median of points, coordinate by coordinate; zero of none.
+/// The median of points, coordinate by coordinate, of two middle ones the mean; zero of none. (`crate::median` is a
+/// measure of noise and takes one that is there.)
 pub fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
     Vector3::from_fn(|k, _| {
         let mut c: Vec<f64> = points.iter().map(|p| p[k]).collect();

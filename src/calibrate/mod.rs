@@ -37,6 +37,7 @@ mod open;
 #[doc(hidden)]
 pub mod page;
 mod parallel;
+pub mod parts;
 mod pixels;
 #[doc(hidden)]
 pub mod poses;
@@ -51,27 +52,20 @@ mod serial;
 mod start;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod tests_bad;
-#[cfg(test)]
-mod tests_closed;
-#[cfg(test)]
-mod tests_known;
 mod unknown;
 #[doc(hidden)]
 pub mod write;
 mod write_parallel;
 
-pub use file::{Calibration, Distance, EFFECTS, Measurement, Tolerances, is_calibration};
-pub use frame::Frame;
-pub use identifiable::{Confounded, Identifiability};
-pub use judge::{Errors, Stats};
-pub use kind::Kind;
-pub use model::{Algorithm, Settings};
-pub use open::{Opened, open, open_pair};
-pub use result::{Calibrated, DistanceResult, GroupResult, Identified, Outlier, RowResult};
-pub use select::Trial;
-pub use unknown::{Part, Unknown};
+pub use file::Calibration;
+#[doc(hidden)]
+pub use file::{EFFECTS, is_calibration};
+pub(crate) use frame::Frame;
+pub use model::Settings;
+#[doc(hidden)]
+pub use open::open_pair;
+pub use open::{Opened, open};
+pub use result::Calibrated;
 
 use crate::error::Result;
 use bench::Bench;

@@ -3,7 +3,8 @@
 use super::{Folder, pretty, print, warn};
 use clap::ValueEnum;
 use excite::Result;
-use excite::calibrate::{self, Algorithm, Calibrated, Settings, Stats, json, page, write};
+use excite::calibrate::parts::{Algorithm, Stats};
+use excite::calibrate::{self, Calibrated, Settings, json, page, write};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -4,12 +4,14 @@ pub mod diagnostic;
 
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::design::diagnostic::PERIODS;
-use excite::design::{Condition, Control, Criterion, Progress, Question, Settings, design_with};
+use excite::design::parts::{Condition, Progress, Question};
+use excite::design::{Control, Criterion, Settings, design_with};
 use excite::identifiability::assess;
 use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;
 use excite::simulate::effects::parse_payload;
-use excite::trajectory::{Ends, Grid, Space, Trajectory};
+use excite::trajectory::Trajectory;
+use excite::trajectory::parts::{Ends, Grid, Space};
 use excite::{Error, Plant, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};

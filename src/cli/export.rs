@@ -5,8 +5,11 @@ use excite::controller::{Card, Column, Course, FORMATS, Leg, Options, Playback, 
 use excite::export::{self, Model, write};
 use excite::mechanism::bundled as parallel;
 use excite::output::write_atomic;
-use excite::robot::{Motion, bundled};
+use excite::report::format::unit_of;
+use excite::robot::bundled;
+use excite::robot::parts::Motion;
 use excite::trajectory::Trajectory;
+use excite::trajectory::certificate::Kind;
 use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -327,10 +330,7 @@ pub fn summary(playback: &Playback, card: &Card) -> String {
             let Some((joint, worst)) = of.max_by(|a, b| a.1.value.total_cmp(&b.1.value)) else {
                 continue;
             };
-            let unit = match motion {
-                Motion::Revolute => "rad",
-                Motion::Prismatic => "m",
-            };
+            let unit = unit_of(Kind::Position, motion);
             let proof = match worst.proven {
                 true => "at most",
                 false => "about, not proven,",

@@ -3,9 +3,8 @@
 use super::{Folder, into, outside, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
 use excite::identify::page;
-use excite::identify::{
-    Consistency, Identification, Method, Settings, condense_parts, identify, identify_parts, json,
-};
+use excite::identify::parts::{Consistency, Method};
+use excite::identify::{Identification, Settings, condense_parts, identify, identify_parts, json};
 use excite::log::{Outline, Record};
 use excite::robot::JointTerm;
 use excite::{Plant, Result, Warning, WarningKind, survey};

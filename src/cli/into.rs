@@ -1,7 +1,8 @@
 //! `--into SCENE`: the result in a copy of the user's own file.
 
 use super::Folder;
-use excite::export::{Edited, Model, into_scene};
+use excite::export::parts::Edited;
+use excite::export::{Model, into_scene};
 use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,8 @@
 use super::{Folder, outside, pretty, print, unwritten, warn, write};
 use clap::ValueEnum;
 use excite::export::{self, Model};
-use excite::load::{self, Identified, Method, Parameters, Settings};
+use excite::load::parts::{Method, Parameters};
+use excite::load::{self, Identified, Settings};
 use excite::log::Experiment;
 use excite::output::prepare_dir;
 use excite::{Error, Result};

@@ -3,7 +3,8 @@
 use super::identify::{columns, consistency};
 use super::{Folder, into, pretty, print, unwritten, warn};
 use excite::export::{self, Model};
-use excite::identify::{Factor, Method, Settings, merge};
+use excite::identify::parts::Method;
+use excite::identify::{Factor, Settings, merge};
 use excite::report::format::percent;
 use excite::{Error, Plant, Result};
 use std::fmt::Write as _;

@@ -2,7 +2,8 @@
 
 use super::{Folder, pretty, print, warn};
 use excite::moves::{Move, Settings};
-use excite::trajectory::{Proof, Trajectory};
+use excite::trajectory::Trajectory;
+use excite::trajectory::parts::Proof;
 use excite::{Error, Plant, Result, Warning};
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -128,7 +128,7 @@ fn robot(kind: &Bundled) -> String {
 
 /// A campaign: the empty robot, its holdout, and the load.
 fn experiment(kind: &Bundled) -> String {
-    let period = excite::design::Question::Load.motion().1;
+    let period = excite::design::parts::Question::Load.motion().1;
     format!(
         "# Campaign of a {}, for motions of `excite design robot.toml --for load` and a second one with another --seed.\n\
          # Logs: t, q1.. (positions of the actuators), tau1.. (or chamber pressures, see `piston` in robot.toml), from the start\n\

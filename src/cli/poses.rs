@@ -2,7 +2,8 @@
 
 use super::{Collisions, Folder, pretty, print, warn};
 use clap::ValueEnum;
-use excite::calibrate::{self, Frame, Kind, Tolerances, poses};
+use excite::calibrate::parts::{Frame, Kind, Tolerances};
+use excite::calibrate::{self, poses};
 use excite::robot::holds_robot;
 use excite::{Error, Result};
 use nalgebra::Vector3;

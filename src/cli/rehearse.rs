@@ -2,7 +2,7 @@
 
 use super::moves::read;
 use super::{pretty, print, warn, write};
-use excite::moves::{Rehearsal, SPEEDS, rehearse};
+use excite::moves::{Rehearsal, rehearse};
 use excite::output::prepare_dir;
 use excite::{Error, Result};
 use std::fmt::Write;
@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(long, default_value_t = 1000.0, allow_negative_numbers = true)]
     rate: f64,
     /// Shares of the speed
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = SPEEDS)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = Rehearsal::SPEEDS)]
     speeds: Vec<f64>,
     /// Directory for rehearsal.json
     #[arg(short, long, default_value = "out")]

@@ -2,13 +2,16 @@
 
 use super::{pretty, print, warn, write};
 use clap::ValueEnum;
-use excite::log::Purpose;
+use excite::log::parts::Purpose;
 use excite::plant::Plant;
+use excite::report::format::unit_of;
 use excite::simulate::effects::parse_payload;
 use excite::simulate::monte_carlo::{MonteCarlo, monte_carlo};
+use excite::simulate::parts::{Controller, Field};
 use excite::simulate::record::{Columns, Sensors, measure, write_log};
-use excite::simulate::{Controller, Field, Run, Settings, simulate};
+use excite::simulate::{Run, Settings, simulate};
 use excite::trajectory::Trajectory;
+use excite::trajectory::certificate::Kind;
 use excite::{Error, Result};
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -317,10 +320,7 @@ fn summary(plant: &Plant, run: &Run, args: &Args, periods: u32, period: f64) -> 
     }
     let joints = plant.actuators();
     if let Some(joint) = joints.get(worst.1) {
-        let unit = match joint.motion {
-            excite::robot::Motion::Revolute => "rad",
-            excite::robot::Motion::Prismatic => "m",
-        };
+        let unit = unit_of(Kind::Position, joint.motion);
         let _ = writeln!(
             out,
             "largest tracking error {:.3e} {unit} ({})",

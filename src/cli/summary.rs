@@ -1,8 +1,9 @@
 //! What is printed when all is written: 80 columns, the verdict in words.
 
-use excite::base::Identifiability;
-use excite::design::{Record, Status};
-use excite::identifiability::{Answer, Assessment, Excitation, LoadAccuracy};
+use excite::base::parts::Identifiability;
+use excite::design::parts::{Record, Status};
+use excite::identifiability::parts::{Answer, LoadAccuracy};
+use excite::identifiability::{Assessment, Excitation};
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -61,7 +62,7 @@ fn answer(a: &Answer) -> String {
         a.question.name(),
         a.seconds
     );
-    let relative = |e: &excite::identifiability::Expected| match e.std {
+    let relative = |e: &excite::identifiability::parts::Expected| match e.std {
         Some(s) => 1.96 * s / e.value.abs(),
         None => f64::INFINITY,
     };

@@ -9,8 +9,10 @@
 
 pub mod build;
 pub mod clearance;
+mod matter;
 pub mod scene;
 mod srdf;
 
 pub use clearance::Clearance;
+pub(crate) use matter::in_words;
 pub use scene::{Obstacle, Pair, Partner, Scene, Volume};

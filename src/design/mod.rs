@@ -23,6 +23,7 @@ pub mod diagnostic;
 pub mod information;
 pub(crate) mod limits;
 mod mechanism_limits;
+pub mod parts;
 pub(crate) mod path;
 mod problem;
 mod purpose;
@@ -41,10 +42,10 @@ mod tool;
 pub(crate) mod torque;
 mod torque_rate;
 
-pub use criterion::{Condition, Criterion};
-pub use purpose::Question;
-pub use record::{Record, Status};
-pub use result::{Control, Design, Progress};
+pub(crate) use criterion::Condition;
+pub use criterion::Criterion;
+pub(crate) use purpose::Question;
+pub use result::{Control, Design};
 pub use settings::Settings;
 
 use crate::base::BaseParameters;
@@ -94,7 +95,8 @@ pub fn design(plant: &Plant, settings: &Settings) -> Result<Design> {
 ///
 /// ```
 /// use excite::Plant;
-/// use excite::design::{Control, Progress, Settings, design_with};
+/// use excite::design::{Control, Settings, design_with};
+/// use excite::design::parts::Progress;
 ///
 /// let plant = Plant::load("planar2")?;
 /// let settings = Settings::default().with(|set| set.starts = Some(1));

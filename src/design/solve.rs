@@ -27,6 +27,7 @@ use super::information::{Evaluation, Information};
 use super::limits::{ExtremaWork, Limits, Rows};
 use super::path::{PathLimits, PathMemory, PathRow};
 use crate::conic::{Problem, Settings as ConicSettings};
+use crate::dot::dot;
 use crate::error::Result;
 use faer::Mat;
 use std::time::Instant;
@@ -425,7 +426,6 @@ fn matrix_inequality(problem: &mut Problem, cluster: &Cluster, n: usize, slot: u
 /// positive definite whatever the curvature.
 fn bfgs(hessian: &mut Option<Mat<f64>>, z: &[f64], y: &[f64]) {
     let n = z.len();
-    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     let (zz, zy, yy) = (dot(z, z), dot(z, y), dot(y, y));
     if zz < 1e-18 || !yy.is_finite() {
         return;

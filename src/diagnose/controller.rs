@@ -18,6 +18,7 @@ use super::data::Data;
 use super::evidence::{Fit, solve};
 use super::thresholds::THRESHOLDS as T;
 use super::window::sign;
+use crate::dot::dot;
 use crate::dynamics::Samples;
 use crate::plant::Plant;
 use crate::signals::wiener::limited;
@@ -383,10 +384,6 @@ fn pushed(
         }
     }
     Ok(out)
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 fn rms(x: &[f64]) -> f64 {

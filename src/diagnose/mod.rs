@@ -50,6 +50,7 @@ mod noise_floor;
 pub mod outside;
 #[doc(hidden)]
 pub mod page;
+pub mod parts;
 pub(crate) mod payload;
 pub(crate) mod prior;
 pub(crate) mod result;
@@ -66,19 +67,15 @@ pub(crate) mod traces;
 pub(crate) mod verdict;
 pub(crate) mod window;
 
-pub use at_rest::AtRest;
-pub use catalogue::{Place, Shape, Value};
 pub use finding::Finding;
-pub use gap::JointGap;
-pub use improve::Improved;
-pub use next::Proposal;
-pub use result::{Diagnosis, RecordGap, RuledOut};
+pub(crate) use gap::JointGap;
+pub use result::Diagnosis;
 #[doc(hidden)]
 pub use second_encoder::{SecondEncoder, Seen};
 pub use settings::Settings;
 #[doc(hidden)]
 pub use traces::Trace;
-pub use verdict::Verdict;
+pub(crate) use verdict::Verdict;
 
 use self::thresholds::THRESHOLDS as T;
 use crate::error::{Error, Result, Warning, WarningKind};

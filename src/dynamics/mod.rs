@@ -18,169 +18,22 @@
 
 mod kernel;
 pub(crate) mod lanes;
+pub mod parts;
 pub(crate) mod point;
+mod samples;
 mod tree;
+mod workspace;
 
 #[doc(hidden)]
 pub use lanes::Isa;
+pub(crate) use parts::Derivatives;
+pub use samples::Samples;
 pub use tree::Tree;
+pub use workspace::Workspace;
 
-use kernel::{Gradients, Pack, Scratch, Sink};
-use lanes::{Lanes, Portable4};
+use kernel::{Gradients, Scratch, Sink};
+use lanes::Lanes;
 use rayon::prelude::*;
-
-/// A sampled motion of all coordinates, joint by joint: joint `j` at sample `i` is
-/// `q[j * count + i]`.
-#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
-pub struct Samples {
-    /// number of coordinates
-    pub dof: usize,
-    /// number of samples
-    pub count: usize,
-    /// positions, rad or m
-    pub q: Vec<f64>,
-    /// velocities
-    pub qd: Vec<f64>,
-    /// accelerations
-    pub qdd: Vec<f64>,
-}
-
-impl Samples {
-    /// A motion at rest in zero, to be filled.
-    pub fn zeros(dof: usize, count: usize) -> Self {
-        let z = vec![0.0; dof * count];
-        Samples {
-            dof,
-            count,
-            q: z.clone(),
-            qd: z.clone(),
-            qdd: z,
-        }
-    }
-
-    /// From one row a sample.
-    ///
-    /// # Panics
-    /// If a row has not `dof` entries, or the three lists differ in length.
-    pub fn from_rows<R: AsRef<[f64]>>(dof: usize, q: &[R], qd: &[R], qdd: &[R]) -> Self {
-        assert!(
-            q.len() == qd.len() && q.len() == qdd.len(),
-            "as many positions as derivatives"
-        );
-        let mut s = Samples::zeros(dof, q.len());
-        for i in 0..q.len() {
-            for (to, from) in [
-                (&mut s.q, &q[i]),
-                (&mut s.qd, &qd[i]),
-                (&mut s.qdd, &qdd[i]),
-            ] {
-                assert_eq!(from.as_ref().len(), dof, "one entry for each coordinate");
-                for (j, x) in from.as_ref().iter().enumerate() {
-                    to[j * q.len() + i] = *x;
-                }
-            }
-        }
-        s
-    }
-
-    /// The motion of these coordinates alone.
-    ///
-    /// # Panics
-    /// If there is no such coordinate.
-    pub fn rows(&self, rows: &[usize]) -> Samples {
-        let n = self.count;
-        let pick = |a: &[f64]| {
-            rows.iter()
-                .flat_map(|&j| &a[j * n..(j + 1) * n])
-                .copied()
-                .collect()
-        };
-        Samples {
-            dof: rows.len(),
-            count: n,
-            q: pick(&self.q),
-            qd: pick(&self.qd),
-            qdd: pick(&self.qdd),
-        }
-    }
-
-    /// Position, velocity and acceleration of joint `j` at sample `i`.
-    pub fn at(&self, j: usize, i: usize) -> [f64; 3] {
-        let k = j * self.count + i;
-        [self.q[k], self.qd[k], self.qdd[k]]
-    }
-
-    fn check(&self, tree: &Tree) {
-        assert_eq!(
-            self.dof,
-            tree.dof(),
-            "motion and robot differ in their coordinates"
-        );
-        let n = self.dof * self.count;
-        assert!(self.q.len() == n && self.qd.len() == n && self.qdd.len() == n);
-    }
-
-    /// Pointers to the pack that starts at sample `i`.
-    ///
-    /// # Safety
-    /// `i` must be a sample.
-    unsafe fn pack(&self, i: usize) -> Pack {
-        // SAFETY: by the caller's promise
-        unsafe {
-            Pack {
-                q: self.q.as_ptr().add(i),
-                qd: self.qd.as_ptr().add(i),
-                qdd: self.qdd.as_ptr().add(i),
-                stride: self.count,
-            }
-        }
-    }
-}
-
-/// Memory of one thread. Grows at first use and is then reused.
-#[derive(Clone)]
-pub struct Workspace {
-    isa: Isa,
-    one: Scratch<f64>,
-    portable: Scratch<Portable4>,
-    #[cfg(all(target_arch = "x86_64", feature = "wide"))]
-    avx2: Scratch<lanes::Avx2>,
-    #[cfg(all(target_arch = "x86_64", feature = "wide"))]
-    avx512: Scratch<lanes::Avx512>,
-}
-
-impl Default for Workspace {
-    fn default() -> Self {
-        Self::with_isa(Isa::detect())
-    }
-}
-
-impl Workspace {
-    /// The instruction set that it runs with.
-    pub fn isa(&self) -> Isa {
-        self.isa
-    }
-
-    /// A workspace for a given instruction set (for tests and benchmarks).
-    ///
-    /// # Panics
-    /// If this machine does not have it.
-    pub fn with_isa(isa: Isa) -> Self {
-        assert!(
-            Isa::available().contains(&isa),
-            "{isa:?} is not available on this machine"
-        );
-        Workspace {
-            isa,
-            one: Scratch::default(),
-            portable: Scratch::default(),
-            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
-            avx2: Scratch::default(),
-            #[cfg(all(target_arch = "x86_64", feature = "wide"))]
-            avx512: Scratch::default(),
-        }
-    }
-}
 
 /// One run over a range of samples; implemented once for each kernel.
 trait Job {
@@ -581,26 +434,5 @@ impl Tree {
             step,
         };
         run(&job, 0, motion.count, ws);
-    }
-}
-
-/// Gradients with respect to positions, velocities and accelerations of every sample.
-#[derive(Debug, Clone, Default)]
-pub struct Derivatives {
-    /// `∂/∂q`
-    pub q: Vec<f64>,
-    /// `∂/∂q̇`
-    pub qd: Vec<f64>,
-    /// `∂/∂q̈`
-    pub qdd: Vec<f64>,
-}
-
-impl Derivatives {
-    /// Sets all to `n` zeros.
-    pub fn resize(&mut self, n: usize) {
-        for x in [&mut self.q, &mut self.qd, &mut self.qdd] {
-            x.clear();
-            x.resize(n, 0.0);
-        }
     }
 }

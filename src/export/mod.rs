@@ -19,10 +19,12 @@
 mod closed;
 pub(crate) mod effects;
 pub(crate) mod element;
+mod format;
 pub(crate) mod isaac_lab;
 #[doc(hidden)]
 pub mod mechanism;
 pub(crate) mod mujoco;
+pub mod parts;
 pub(crate) mod remark;
 pub(crate) mod robot_toml;
 pub(crate) mod scene;
@@ -34,14 +36,16 @@ pub(crate) mod usd;
 
 #[doc(hidden)]
 pub use element::{Element, Form};
+pub(crate) use format::{Format, Part};
 #[doc(hidden)]
 pub use remark::Remark;
+pub(crate) use scene::Edited;
+pub use scene::into_scene;
 pub(crate) use scene::page as scene_page;
-pub use scene::{Change, Edited, into_scene};
 
 use crate::error::{Result, Warning, WarningKind};
 use crate::plant::{Column, Plant};
-use crate::robot::{Inertia, JointTerm, Robot};
+use crate::robot::{Inertia, Robot};
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, Vector3};
 
 /// A model to be written.
@@ -53,61 +57,6 @@ pub struct Model<'a> {
     pub robot: &'a Robot,
     /// what the bodies and joints cannot hold
     pub remarks: &'a [Remark],
-}
-
-/// A part of a model, in which an effect may be held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub enum Part {
-    /// inertia of bodies
-    Bodies,
-    /// a term of joints
-    Term(JointTerm),
-    /// acceleration of gravity
-    Gravity,
-    /// where the frames of bodies are
-    Frames,
-}
-
-impl Part {
-    /// What MuJoCo's file says of it.
-    pub(crate) fn words(self) -> &'static str {
-        match self {
-            Part::Bodies => "inertial of the bodies",
-            Part::Term(JointTerm::Armature) => "armature",
-            Part::Term(JointTerm::Viscous) => "damping",
-            Part::Term(JointTerm::Coulomb) => "frictionloss",
-            Part::Term(JointTerm::Offset) => "a far spring",
-            Part::Gravity => "gravity",
-            Part::Frames => "pos and quat of the bodies",
-        }
-    }
-}
-
-/// A file format.
-pub trait Format: Sync {
-    /// Name, by which effects know it.
-    fn name(&self) -> &'static str;
-    /// Name of the file.
-    fn file(&self) -> &'static str;
-    /// Whether it can hold robots of this kind.
-    fn holds(&self, _plant: &Plant) -> bool {
-        true
-    }
-    /// Whether it has this part of a model.
-    fn has(&self, part: Part) -> bool;
-    /// How it holds an element.
-    fn element(&self, _element: &Element) -> Form {
-        Form::None
-    }
-    /// Whether a model has anything for it.
-    fn needed(&self, _model: &Model) -> bool {
-        true
-    }
-    /// Text of the file.
-    ///
-    /// # Errors
-    /// A model that it cannot hold.
-    fn write(&self, model: &Model) -> Result<String>;
 }
 
 /// All formats.
@@ -164,6 +113,7 @@ fn breakaway(robot: &Robot) -> Vec<String> {
         .collect()
 }
 
+#[doc(hidden)]
 /// Names of the files that a robot of this kind may be written to.
 pub fn files(plant: &Plant) -> Vec<&'static str> {
     let held = FORMATS.iter().filter(|f| f.holds(plant));
@@ -179,7 +129,7 @@ pub fn all() -> Vec<&'static str> {
 }
 
 /// Names of the files that a model needs.
-pub fn needed(model: &Model) -> Vec<&'static str> {
+pub(crate) fn needed(model: &Model) -> Vec<&'static str> {
     let held = FORMATS.iter().filter(|f| f.holds(model.plant));
     held.filter(|f| f.needed(model)).map(|f| f.file()).collect()
 }

@@ -9,7 +9,9 @@ use crate::design::Question;
 use crate::design::question::{of_legs, with_friction};
 use crate::error::{Error, Result};
 use crate::plant::Plant;
-use crate::robot::{Column, JointTerm, Motion};
+use crate::report::format::unit_of;
+use crate::robot::{Column, JointTerm};
+use crate::trajectory::certificate::Kind as Limited;
 use crate::trajectory::{Trajectory, sample_period};
 use faer::Mat;
 
@@ -162,10 +164,7 @@ fn parameters(plant: &Plant, trajectory: &Trajectory, question: Question) -> Res
             Kind::Speed => (
                 "stribeck_velocity",
                 joint.stribeck.velocity,
-                match joint.motion {
-                    Motion::Revolute => "rad/s",
-                    Motion::Prismatic => "m/s",
-                },
+                unit_of(Limited::Velocity, joint.motion),
             ),
         };
         Expected {

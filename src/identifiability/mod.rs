@@ -21,15 +21,18 @@ pub mod json;
 mod load;
 #[doc(hidden)]
 pub mod page;
+pub mod parts;
 mod platform;
 mod spread;
 
-pub use answer::{Answer, Expected};
-pub use clearance::{Clearances, LinkVolumes};
-pub use elsewhere::TorqueUncertainty;
-pub use load::{GAIN, LoadAccuracy};
-pub use platform::Platform;
-pub use spread::Spread;
+pub(crate) use answer::{Answer, Expected};
+pub(crate) use clearance::Clearances;
+pub(crate) use elsewhere::TorqueUncertainty;
+#[doc(hidden)]
+pub use load::GAIN;
+pub(crate) use load::LoadAccuracy;
+pub(crate) use platform::Platform;
+pub(crate) use spread::Spread;
 
 use crate::base::BaseParameters;
 use crate::design::{Question, Settings};

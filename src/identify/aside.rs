@@ -11,6 +11,7 @@
 use super::followers::followers;
 use super::stack::Stack;
 use super::trace::Trace;
+use crate::dot::dot;
 use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::signals::Prepared;
@@ -112,7 +113,7 @@ fn free(s: &mut Stack, a: usize, signals: Vec<Vec<f64>>) {
         // twice is enough (Giraud, Langou & Rozložník 2005)
         for _ in 0..2 {
             for q in &basis {
-                let c: f64 = q.iter().zip(&g).map(|(x, y)| x * y).sum();
+                let c = dot(q, &g);
                 g.iter_mut().zip(q).for_each(|(y, x)| *y -= c * x);
             }
         }
@@ -126,7 +127,7 @@ fn free(s: &mut Stack, a: usize, signals: Vec<Vec<f64>>) {
     for q in &basis {
         for list in [&mut s.measured, &mut s.known] {
             let part = &mut list[rows.clone()];
-            let c: f64 = q.iter().zip(part.iter()).map(|(x, y)| x * y).sum();
+            let c = dot(q, part);
             part.iter_mut().zip(q).for_each(|(y, x)| *y -= c * x);
         }
         for k in 0..s.w.ncols() {

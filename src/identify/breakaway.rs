@@ -21,7 +21,9 @@ use super::{Identification, Settings};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Record;
 use crate::plant::Plant;
-use crate::robot::{JointTerm, Motion, Stribeck};
+use crate::report::format::unit_of;
+use crate::robot::{JointTerm, Stribeck};
+use crate::trajectory::certificate::Kind;
 use faer::Mat;
 pub use turn::Breakaway;
 use turn::{Rows, Turn, sticking};
@@ -40,10 +42,7 @@ pub(super) fn values(plant: &Plant, id: &Identification) -> Vec<Value> {
     let joints = plant.actuators();
     let each = id.breakaway.iter().flat_map(|b| {
         let joint = joints[b.actuator];
-        let units = match joint.motion {
-            Motion::Revolute => ["N m", "rad/s"],
-            Motion::Prismatic => ["N", "m/s"],
-        };
+        let units = [Kind::Torque, Kind::Velocity].map(|kind| unit_of(kind, joint.motion));
         let value = |name: &str, value, std, nominal, unit| Value {
             name: format!("{}.{name}", joint.name),
             value,

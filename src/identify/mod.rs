@@ -6,7 +6,7 @@
 //!
 //! 1. `equations`: the filtered equations `W_b π = τ` of each record (`stack`).
 //!    Those of joints that stand still are left out of the fit (`standstill`).
-//! 2. `method`: base parameters `π̂` by the chosen [`Method`], from rows compressed by blocks
+//! 2. `method`: base parameters `π̂` by the chosen [`Method`](parts::Method), from rows compressed by blocks
 //!    (`linear`). What follows another joint is fitted aside (`aside`).
 //! 3. `normal`: their information `Λ`, and their covariance with the residual's correlation in time
 //!    (`uncertainty`).
@@ -41,6 +41,7 @@ pub(crate) mod method;
 pub(crate) mod normal;
 #[doc(hidden)]
 pub mod page;
+pub mod parts;
 pub(crate) mod settings;
 pub(crate) mod stack;
 pub(crate) mod standard;
@@ -51,17 +52,14 @@ pub(crate) mod uncertainty;
 pub(crate) mod validation;
 pub(crate) mod weights;
 
-pub use breakaway::Breakaway;
 pub use condense::condense;
-pub use cross_validation::Trial;
-pub use essential::Essential;
 pub use factor::Factor;
 pub use identification::Identification;
 #[doc(hidden)]
 pub use in_parts::{condense_parts, identify_parts};
-pub use merge::{Merged, merge};
-pub use settings::{Consistency, Method, Settings};
-pub use validation::{Errors, JointError, Validation};
+pub use merge::merge;
+pub(crate) use settings::Consistency;
+pub use settings::Settings;
 
 use crate::error::Result;
 use crate::log::Record;
@@ -74,7 +72,7 @@ use normal::Normal;
 /// ```
 /// use excite::Plant;
 /// use excite::identify::{Settings, identify};
-/// use excite::log::Purpose;
+/// use excite::log::parts::Purpose;
 /// use excite::simulate::{Sensors, Settings as Simulation, measure, simulate, to_record};
 ///
 /// // a rehearsal: design, simulate, measure

@@ -11,9 +11,11 @@ pub use verdict::verdict;
 use crate::identify::{Identification, Settings};
 use crate::log::Purpose;
 use crate::plant::Plant;
+use crate::report::format::unit_of;
 use crate::report::html::{self, Section, Tone};
 use crate::report::joints;
 use crate::robot::Motion;
+use crate::trajectory::certificate::Kind;
 use maud::html;
 
 /// `report.html`.
@@ -75,8 +77,5 @@ fn names(id: &Identification, purpose: Purpose) -> String {
 
 /// Unit of the force of a joint.
 fn force(motion: Motion) -> &'static str {
-    match motion {
-        Motion::Revolute => "N m",
-        Motion::Prismatic => "N",
-    }
+    unit_of(Kind::Torque, motion)
 }

@@ -40,6 +40,7 @@ pub mod json;
 pub(crate) mod one_step;
 #[doc(hidden)]
 pub mod page;
+pub mod parts;
 pub(crate) mod records;
 pub(crate) mod settings;
 mod suspicion;
@@ -49,13 +50,13 @@ pub mod two_step;
 pub(crate) mod weight;
 
 pub use body::LoadBody;
-pub use gain::Gains;
+pub(crate) use gain::Gains;
 pub use identified::Identified;
-pub use one_step::OneStep;
 #[doc(hidden)]
 pub use records::Loaded;
-pub use settings::{Method, Parameters, Settings};
-pub use two_step::TwoStep;
+pub(crate) use settings::Method;
+pub use settings::Settings;
+pub(crate) use two_step::TwoStep;
 
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Experiment, Payload};

@@ -24,6 +24,7 @@ pub(crate) mod merge;
 pub(crate) mod names;
 pub(crate) mod number;
 mod outline;
+pub mod parts;
 mod pose_check;
 pub(crate) mod pressure;
 pub(crate) mod record;
@@ -35,6 +36,7 @@ mod written;
 pub use experiment::Experiment;
 #[doc(hidden)]
 pub use outline::Outline;
+pub(crate) use parts::{Payload, Purpose};
 #[doc(hidden)]
 pub use table::Table;
 #[doc(hidden)]
@@ -42,35 +44,6 @@ pub use written::{Channels, Written};
 
 use crate::error::Warning;
 use std::path::PathBuf;
-
-/// What a record is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Purpose {
-    /// parameters are estimated from it
-    Fit,
-    /// the model is tested on it, and it is used for nothing else
-    Holdout,
-}
-
-/// What the robot carried.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Payload {
-    /// nothing, or nothing was said
-    #[default]
-    None,
-    /// something that is to be identified
-    Unknown,
-    /// a body that is known
-    Known {
-        /// kg
-        mass: f64,
-        /// centre of mass in the frame of the last link (platform), m; `None`: a weight of which only the mass is known
-        com: Option<[f64; 3]>,
-        /// tensor about the centre of mass, xx, xy, xz, yy, yz, zz, kg m²
-        inertia: Option<[f64; 6]>,
-    },
-}
 
 /// One log on an even time grid. Channels are lists of one list an actuator, in the order of the
 /// robot file.

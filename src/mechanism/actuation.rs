@@ -1,7 +1,7 @@
 //! The map from actuators to joints, `A = D_a⁺` and `G = D A`, sample by sample.
 
 use super::Mechanism;
-use super::geometry::{Pass, run};
+use super::batch::{Pass, run};
 use super::motion::{MechanismMotion, finite};
 use crate::dynamics::lanes::{Isa, Lanes};
 use nalgebra::DMatrix;

@@ -2,7 +2,8 @@
 //! (Clavel 1988). Every rod is a body: 10 bodies, 100 columns. See
 //! [`parallelogram`] for the chain.
 
-use super::geometry::{ClosedForm, Kinematics};
+use super::closed_form::ClosedForm;
+use super::geometry::Kinematics;
 use super::parallelogram::{self, Bodies, Chain, Parallelograms};
 use super::task::Task;
 use super::{Mechanism, Setup, Source};

@@ -18,15 +18,16 @@
 //!
 //! Khalil & Guégan, IEEE Transactions on Robotics 20(4), 2004, give the same model in closed form.
 
+use super::closed_form::ClosedForm;
 use super::dimensions::{Dimensions, LEG, LegChain};
-use super::geometry::{ClosedForm, Cone, Coordinates, Kinematics, Segment};
+use super::geometry::{Cone, Coordinates, Kinematics, Segment};
 use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
 use super::task::{Task, rotation};
 use super::tree::{Builder, Place};
 use super::{Mechanism, Setup, Source};
 use crate::error::{Error, Result};
-use crate::robot::{Inertia, JointTerm, Limits, Motion};
+use crate::robot::{Inertia, Joint, JointTerm, Limits, Motion};
 use nalgebra::{Matrix3, Vector3};
 
 /// Geometry and bodies of one leg.
@@ -145,12 +146,12 @@ impl GoughStewart {
         };
         let mut tree = Builder::default();
         for (i, leg) in self.legs.iter().enumerate() {
-            tree.coordinate(&format!("leg{}", i + 1), Motion::Prismatic);
-            let joint = tree.last();
+            let mut joint = Joint::new(&format!("leg{}", i + 1), Motion::Prismatic);
             joint.limits = leg.limits;
             joint.terms = leg.terms;
             joint.torque_noise = leg.force_noise;
             joint.identify = JointTerm::ALL.map(|t| self.identify.contains(&t));
+            tree.add(joint);
         }
         for i in 0..6 {
             tree.coordinate(&format!("leg{}_alpha", i + 1), Motion::Revolute);

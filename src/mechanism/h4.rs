@@ -16,7 +16,8 @@
 //! the weight of the arms, `g cos q`, 18. In the tree these are `Ixx` (and `mz`) of the arms, `m`
 //! and `Izz` of the platform.
 
-use super::geometry::{ClosedForm, Kinematics};
+use super::closed_form::ClosedForm;
+use super::geometry::Kinematics;
 use super::parallelogram::{self, Bodies, Chain, Parallelograms};
 use super::parameters::{Group, Pattern};
 use super::task::Task;

@@ -18,6 +18,7 @@
 //! errors.
 
 mod closure;
+mod least_squares;
 mod newton;
 pub mod yaml;
 

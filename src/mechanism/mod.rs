@@ -20,9 +20,11 @@
 
 mod actuation;
 mod actuators;
+mod batch;
 #[doc(hidden)]
 pub mod bundled;
 mod certificate;
+mod closed_form;
 mod deformed;
 #[doc(hidden)]
 pub mod delta;
@@ -45,25 +47,28 @@ mod motion_file;
 #[doc(hidden)]
 pub mod parallelogram;
 pub(crate) mod parameters;
+pub mod parts;
 mod reach;
 mod regressor;
 #[doc(hidden)]
 pub mod scalar;
 mod singularity;
+mod source;
 mod states;
 pub(crate) mod task;
 mod torque;
 #[doc(hidden)]
 pub mod tree;
 
-pub use certificate::MechanismCertificate;
+pub(crate) use certificate::MechanismCertificate;
 #[doc(hidden)]
 pub use certificate::PosePeak;
 #[doc(hidden)]
 pub use forward::Solution;
-pub use geometry::{ClosedForm, Coordinates, Kinematics, Segment};
+pub(crate) use geometry::Segment;
 #[doc(hidden)]
 pub use geometry::{Cone, Geometry, Path};
+pub use geometry::{Coordinates, Kinematics};
 #[doc(hidden)]
 pub use gradients::TaskDerivatives;
 pub(crate) use gradients::rounded_sign;
@@ -71,76 +76,24 @@ pub(crate) use gradients::rounded_sign;
 pub use margins::{Margins, PoseKind, PoseUse};
 #[doc(hidden)]
 pub use motion::MechanismMotion;
-pub use motion::MechanismWorkspace;
+pub(crate) use motion::MechanismWorkspace;
 pub(crate) use motion_file::read_joint_motion;
 #[doc(hidden)]
 pub use parameters::Parameters;
-pub use parameters::{Group, Pattern};
-pub use scalar::{Pack, Scalar};
+pub(crate) use parameters::{Group, Pattern};
+pub use scalar::Scalar;
 #[doc(hidden)]
 pub use singularity::{SINGULAR, Singularity, Spread};
+pub use source::Setup;
+pub(crate) use source::Source;
 #[doc(hidden)]
 pub use task::PlatformMotion;
-pub use task::Task;
-pub use tree::{Builder, Place};
+pub(crate) use task::Task;
 
 use crate::dynamics::{Samples, Tree};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Column, Inertia, Joint, JointTerm, Limits, Motion, Robot};
-use loops::Closure;
 use std::sync::Arc;
-
-/// Where a mechanism comes from: what a writer of robot files must know of it.
-#[derive(Debug, Clone)]
-pub enum Source {
-    /// `mechanism = "gough-stewart"`
-    GoughStewart,
-    /// `mechanism = "h4"`
-    H4,
-    /// `mechanism = "delta"`
-    Delta,
-    /// `mechanism = "loops"`: a tree with these closures
-    Loops(Vec<Closure>),
-    /// this mechanism, its actuators in place of its platform ([`Mechanism::in_actuators`])
-    InActuators(Box<Mechanism>),
-    /// kinematics in code, with a name for messages: no file format stands for it
-    Code(String),
-}
-
-impl Source {
-    /// `gough-stewart`, `h4`, `delta`, `loops`, or the name of what was written in code.
-    pub fn name(&self) -> &str {
-        match self {
-            Source::GoughStewart => "gough-stewart",
-            Source::H4 => "h4",
-            Source::Delta => "delta",
-            Source::Loops(_) => "loops",
-            Source::InActuators(platform) => platform.source.name(),
-            Source::Code(name) => name,
-        }
-    }
-}
-
-/// What a mechanism is put together from.
-#[derive(Debug)]
-pub struct Setup {
-    /// where it comes from
-    pub source: Source,
-    /// the tree
-    pub robot: Robot,
-    /// indices of the actuated coordinates, in the order of the columns of logs
-    pub actuated: Vec<usize>,
-    /// what the task coordinates are
-    pub task: Task,
-    /// kinematics
-    pub geometry: Box<dyn Geometry>,
-    /// unknown bodies; bodies in no group keep their inertia as known
-    pub groups: Vec<Group>,
-    /// task coordinates of the middle of the workspace
-    pub home: Vec<f64>,
-    /// characteristic length by which angles are turned into lengths, m
-    pub length: f64,
-}
 
 /// A closed chain. See the [module](self) documentation.
 #[derive(Debug, Clone)]

@@ -23,7 +23,7 @@ use super::parameters::{Group, Pattern};
 use super::scalar::{Scalar, linear};
 use super::task::{Task, rotation};
 use super::tree::{Builder, Place};
-use crate::robot::{Inertia, JointTerm, Limits, Motion};
+use crate::robot::{Inertia, Joint, JointTerm, Limits, Motion};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Geometry and bodies of one chain.
@@ -259,12 +259,12 @@ pub(super) fn tree(
     let n = chains.len();
     let mut tree = Builder::default();
     for (i, chain) in chains.iter().enumerate() {
-        tree.coordinate(&format!("motor{}", i + 1), Motion::Revolute);
-        let joint = tree.last();
+        let mut joint = Joint::new(&format!("motor{}", i + 1), Motion::Revolute);
         joint.limits = chain.limits;
         joint.terms = chain.terms;
         joint.torque_noise = chain.torque_noise;
         joint.identify = JointTerm::ALL.map(|t| identify.contains(&t));
+        tree.add(joint);
     }
     for i in 0..n {
         for rod in ["a", "b"] {

@@ -43,16 +43,13 @@ pub struct Builder {
 impl Builder {
     /// Adds a coordinate without limits; returns its index.
     pub fn coordinate(&mut self, name: &str, motion: Motion) -> usize {
-        self.joints.push(Joint::new(name, motion));
-        self.joints.len() - 1
+        self.add(Joint::new(name, motion))
     }
 
-    /// The coordinate added last.
-    ///
-    /// # Panics
-    /// If there is none.
-    pub fn last(&mut self) -> &mut Joint {
-        self.joints.last_mut().expect("a coordinate was added")
+    /// Adds a coordinate with its limits and terms; returns its index.
+    pub fn add(&mut self, joint: Joint) -> usize {
+        self.joints.push(joint);
+        self.joints.len() - 1
     }
 
     /// Adds a massless body that moves with a coordinate about or along `axis` (body axes); returns

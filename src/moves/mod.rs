@@ -27,6 +27,8 @@ mod leg;
 mod limits;
 mod load;
 mod moving;
+pub mod parts;
+mod peaks;
 mod plan;
 mod planner;
 mod profile;
@@ -34,11 +36,11 @@ mod rehearsal;
 mod rest;
 mod tool;
 
-pub use guard::Least;
-pub use load::TorquePeak;
-pub use profile::Peaks;
-pub use rehearsal::{Load, Rehearsal, SPEEDS, Speed, rehearse};
-pub use tool::ToolPeak;
+pub(crate) use guard::Least;
+pub(crate) use load::TorquePeak;
+pub(crate) use peaks::JointPeaks;
+pub use rehearsal::{Rehearsal, rehearse};
+pub(crate) use tool::ToolPeak;
 
 use crate::collision::clearance::Path;
 use crate::collision::scene::Scene;
@@ -119,21 +121,6 @@ impl Default for Settings {
             rate: None,
         }
     }
-}
-
-/// What one coordinate does during a move.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-#[non_exhaustive]
-pub struct JointPeaks {
-    /// its name
-    pub joint: String,
-    /// exact extrema over all time
-    #[serde(flatten)]
-    pub peaks: Peaks,
-    /// share of the full limit of velocity, acceleration and jerk that is used, assumed limits included
-    pub used: [f64; 3],
-    /// share that it exceeds at no time of the velocity that its position leaves; `None` without such a limit
-    pub velocity_by_position: Option<f64>,
 }
 
 /// A move from one state to another.

@@ -7,6 +7,7 @@
 //! Extrema are exact: positions turn where the quadratic `v` vanishes, velocities where the straight
 //! line `a` does.
 
+use super::peaks::Peaks;
 use crate::robot::VelocityByPosition;
 use crate::trajectory::by_position::share;
 use nalgebra::{Matrix3, Vector3};
@@ -62,20 +63,6 @@ pub struct Profile {
     pieces: Vec<Piece>,
     /// end, s
     pub duration: f64,
-}
-
-/// Largest magnitudes over all time.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
-#[non_exhaustive]
-pub struct Peaks {
-    /// least and largest position
-    pub position: [f64; 2],
-    /// largest speed
-    pub velocity: f64,
-    /// largest acceleration
-    pub acceleration: f64,
-    /// largest jerk
-    pub jerk: f64,
 }
 
 impl Profile {

@@ -17,8 +17,6 @@ use crate::plant::Plant;
 use crate::trajectory::samples::{length_of_samples, times};
 use crate::trajectory::{Fourier, Trajectory};
 
-/// Shares of the speed that are rehearsed.
-pub const SPEEDS: [f64; 3] = [0.1, 0.3, 1.0];
 /// Samples of a period: so many a harmonic, and at least.
 const PER_HARMONIC: usize = 100;
 const FEWEST: usize = 2000;
@@ -117,17 +115,22 @@ pub struct Rehearsal {
     pub speeds: Vec<Speed>,
 }
 
+impl Rehearsal {
+    /// Shares of the speed that are rehearsed.
+    pub const SPEEDS: [f64; 3] = [0.1, 0.3, 1.0];
+}
+
 /// Rehearses a trajectory at some shares of its speed, sampled at `rate` hertz when it is run.
 ///
 /// ```
 /// use excite::Plant;
-/// use excite::moves::{SPEEDS, rehearse};
+/// use excite::moves::{Rehearsal, rehearse};
 /// use excite::trajectory::{Fourier, Series, Trajectory};
 ///
 /// let plant = Plant::load("planar2")?;
 /// let swing = Series { constant: 0.0, sin: vec![0.4], cos: vec![0.0] };
 /// let fourier = Fourier::new(5.0, vec![1], vec![swing.clone(), swing])?;
-/// let table = rehearse(&plant, &Trajectory::new(plant.moved(), fourier), 1000.0, &SPEEDS)?;
+/// let table = rehearse(&plant, &Trajectory::new(plant.moved(), fourier), 1000.0, &Rehearsal::SPEEDS)?;
 /// assert_eq!(table.speeds[0].samples, 50_001); // a tenth of the speed, 50 s
 /// # Ok::<(), excite::Error>(())
 /// ```

@@ -18,20 +18,20 @@ mod follow;
 mod kind;
 mod motion_file;
 mod noise;
+pub mod parts;
 mod scene;
 mod summary;
 mod torque;
 mod values;
 
-pub use crate::robot::{Column, Parameter};
-pub use certify::Certified;
+pub(crate) use crate::robot::{Column, Parameter};
 #[doc(hidden)]
 pub use follow::Rates;
 #[doc(hidden)]
 pub use noise::DEFAULT_NOISE;
 #[doc(hidden)]
 pub use scene::SeriesPath;
-pub use scene::{ClearanceCertificate, PairClearance};
+pub(crate) use scene::{ClearanceCertificate, PairClearance};
 
 use crate::base::{self, BaseParameters};
 use crate::collision::Scene;

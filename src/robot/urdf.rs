@@ -17,8 +17,10 @@
 
 mod drive;
 mod geometry;
+mod inertial;
 mod limits;
 mod read;
+mod source;
 mod tree;
 
 use super::geometry::Form;

@@ -23,7 +23,8 @@ impl Plan {
             return Vec::new();
         };
         let mut out = forward.make_output_vec();
-        (forward.process(&mut x, &mut out)).expect("a signal as long as planned");
+        (forward.process(&mut x, &mut out))
+            .expect("signals are as long as their plan: the one error");
         out
     }
 }
@@ -51,7 +52,8 @@ impl Inverse {
             return Vec::new();
         };
         let mut out = back.make_output_vec();
-        (back.process(&mut spectrum, &mut out)).expect("the spectrum of a real signal");
+        (back.process(&mut spectrum, &mut out))
+            .expect("first and last line are real, and as many as planned: the two errors");
         out
     }
 }

@@ -33,6 +33,7 @@ pub(crate) mod decimate;
 pub mod fourier;
 mod grid;
 mod inner;
+pub mod parts;
 mod prepare;
 pub(crate) mod repeats;
 pub(crate) mod series;
@@ -43,26 +44,13 @@ pub(crate) mod wiener;
 pub use butterworth::Butterworth;
 #[doc(hidden)]
 pub use decimate::Decimator;
+pub(crate) use parts::{Derivation, Periods};
 #[doc(hidden)]
 pub use prepare::{averaged, common_cutoff};
 
 use crate::dynamics::Samples;
 use crate::error::Warning;
 use crate::log::Purpose;
-use faer::Mat;
-
-/// How positions are differentiated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Derivation {
-    /// a low-pass whose cut-off is chosen from the data: whole harmonics of a motion that repeats, a
-    /// Butterworth filter otherwise
-    #[default]
-    LowPass,
-    /// as the diagnosis does it (`wiener`): every harmonic of a motion that repeats weighted by how far it
-    /// stands out of the scatter between periods, a fixed low-pass otherwise
-    Wiener,
-}
 
 /// How signals are prepared. `None` is chosen from the data.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -99,27 +87,6 @@ impl Default for Settings {
             measured_pose: false,
         }
     }
-}
-
-/// What the periods of a repeated motion tell beside their mean.
-#[derive(Debug, Clone, serde::Serialize)]
-pub struct Periods {
-    /// number of whole periods
-    pub count: usize,
-    /// samples of one
-    pub samples: usize,
-    /// length, s
-    pub period: f64,
-    /// measured torques of each period, actuator-major (`a·samples + i`), unfiltered
-    pub torque: Vec<Vec<f64>>,
-    /// measured positions of the actuators of each period, likewise
-    pub position: Vec<Vec<f64>>,
-    /// covariance of the torque noise of one period between actuators, (N m)², unfiltered:
-    /// the scatter about the mean, `1/((n_p−1)N) Σ_p Σ_i e_p(i) e_p(i)ᵀ`
-    #[serde(serialize_with = "crate::output::rows")]
-    pub torque_covariance: Mat<f64>,
-    /// standard deviation of the position noise of one period of each actuator
-    pub position_noise: Vec<f64>,
 }
 
 /// A record ready for estimation. Lists are actuator-major (`a·count + i`) like the motion's.

@@ -122,24 +122,19 @@ impl Series {
         Cow::Owned(kept.map(|(x, c)| if *c { *x } else { 0.0 }).collect())
     }
 
-    /// Mean period of a signal of actuator `j`, over samples that count; 0 where no period has one.
-    ///
-    /// # Panics
-    /// If the record does not repeat.
+    /// Mean period of a signal of actuator `j`, over samples that count; 0 where no period has one. A record that does
+    /// not repeat is one period.
     pub fn period_mean(&self, j: usize, x: &[f64]) -> Vec<f64> {
-        let cycle = self.cycle.expect("a record that repeats");
-        means(x, &self.counted(j), cycle)
+        means(x, &self.counted(j), self.cycle.unwrap_or(self.count))
             .into_iter()
             .map(Option::unwrap_or_default)
             .collect()
     }
 
-    /// Freedoms that are left of the samples of actuator `j` that count, beside their mean period.
-    ///
-    /// # Panics
-    /// If the record does not repeat.
+    /// Freedoms that are left of the samples of actuator `j` that count, beside their mean period; none of a record
+    /// that does not repeat.
     pub fn freedoms(&self, j: usize) -> usize {
-        freedoms(&self.counted(j), self.cycle.expect("a record that repeats"))
+        freedoms(&self.counted(j), self.cycle.unwrap_or(self.count))
     }
 
     /// Brings a log onto its grid. `likely` are periods of other records, tried where it states none.

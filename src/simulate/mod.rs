@@ -33,17 +33,17 @@ pub mod effects;
 pub(crate) mod friction;
 #[doc(hidden)]
 pub mod monte_carlo;
+pub mod parts;
 #[doc(hidden)]
 pub mod record;
 pub(crate) mod run;
 pub(crate) mod settings;
 mod simulator;
 
-pub use control::Controller;
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Terms};
-pub use effects::{Effects, Field};
-pub use record::{Measured, Sensors, measure, to_record};
+pub use effects::Effects;
+pub use record::{Sensors, measure, to_record};
 pub use run::Run;
 pub use settings::Settings;
 

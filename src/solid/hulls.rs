@@ -12,6 +12,7 @@
 //! volume.
 
 use super::distance::from_point;
+use super::enclose::{corners, enclose, principal_axes};
 use super::fit::{self, Fit};
 use super::hull::hull;
 use super::mesh::Mesh;
@@ -60,9 +61,9 @@ pub fn hulls(mesh: &Mesh, most: usize) -> Fit {
 
 /// Volume of the hull of some triangles, and [`SKIN`] times the surface of the box about their axes, m³.
 fn bulk(mesh: &Mesh, triangles: &[usize], skin: f64) -> f64 {
-    let points = fit::corners(mesh, triangles);
+    let points = corners(mesh, triangles);
     let volume = hull(&points).map_or(0.0, |h| h.volume);
-    let size = fit::principal_axes(&points).map(|axis| {
+    let size = principal_axes(&points).map(|axis| {
         let along = points.iter().map(|p| axis.dot(p));
         let (lo, hi) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
             (a.min(x), b.max(x))
@@ -89,7 +90,7 @@ fn split(mesh: &Mesh, triangles: &[usize], skin: f64) -> Option<Split<Vec<usize>
 
 /// The hull of few corners that holds these triangles; a capsule or box where they lie in a plane.
 fn polytope(mesh: &Mesh, triangles: &[usize]) -> Shape {
-    let outer = fit::corners(mesh, triangles);
+    let outer = corners(mesh, triangles);
     let mut core: Vec<V> = outer.first().copied().into_iter().collect();
     // upper bounds of the distances: each falls as the core grows
     let mut far: Vec<(f64, usize)> = vec![(f64::INFINITY, 0); outer.len()];
@@ -112,5 +113,5 @@ fn polytope(mesh: &Mesh, triangles: &[usize]) -> Shape {
     let outside = used.par_iter().map(|i| from_point(&core, &mesh.points[*i]));
     // rounding must leave no corner outside
     let radius = outside.reduce(|| 0.0, f64::max) * (1.0 + 1e-9) + 1e-9;
-    Shape::hull(&core, radius).unwrap_or_else(|| fit::enclose(mesh, triangles))
+    Shape::hull(&core, radius).unwrap_or_else(|| enclose(mesh, triangles))
 }

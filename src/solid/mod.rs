@@ -14,6 +14,7 @@
 
 pub mod dae;
 pub mod distance;
+mod enclose;
 pub mod fit;
 pub mod formats;
 pub mod hull;

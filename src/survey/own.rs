@@ -1,5 +1,7 @@
 //! What a joint adds to its torque by itself: an offset, the inertia of its rotor, and friction.
 
+use crate::dot::dot;
+
 /// Own terms of a joint: orthonormal columns from an offset, its acceleration and its friction.
 pub(super) struct Own {
     /// offset; acceleration; viscous friction; Coulomb friction beside it; Coulomb friction alone. Zero where others make
@@ -101,10 +103,6 @@ fn unit(column: &[f64], others: &[&[f64]]) -> Vec<f64> {
         true => rest.iter().map(|x| x / norm).collect(),
         false => vec![0.0; column.len()],
     }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// A signal without what an orthonormal basis explains of it.

@@ -11,7 +11,8 @@
 //! hypothesis is the sum over columns of `−K/2 ln(1 − R²)` of the joint that explains each best. Swaps of two joints and
 //! turned signs are tried until none is better, from the stated order and from random ones.
 
-use super::own::{Along, KINDS, Own, dot, residual};
+use super::own::{Along, KINDS, Own, residual};
+use crate::dot::dot;
 use crate::dynamics::{Samples, Workspace};
 use crate::plant::Plant;
 use rand::seq::SliceRandom;

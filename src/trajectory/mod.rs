@@ -20,6 +20,7 @@ pub(crate) mod fourier;
 pub(crate) mod grid;
 #[doc(hidden)]
 pub mod jets;
+pub mod parts;
 #[doc(hidden)]
 pub mod samples;
 pub(crate) mod table;
@@ -28,24 +29,28 @@ pub(crate) mod torque;
 
 #[doc(hidden)]
 pub use basis::Basis;
-pub use basis::Ends;
-pub use bounds::{SampledBound, TorqueBound};
-pub use by_position::PositionPeak;
-pub use certificate::{Certificate, JointCertificate, Peak, Proof, Range, certify};
+pub(crate) use basis::Ends;
+pub(crate) use bounds::{SampledBound, TorqueBound};
+pub(crate) use by_position::PositionPeak;
+pub use certificate::Certificate;
+#[doc(hidden)]
+pub use certificate::certify;
+pub(crate) use certificate::{JointCertificate, Proof};
 #[doc(hidden)]
 pub use extrema::{Extrema, Extremum, extrema};
 #[doc(hidden)]
 pub use extrema_fast::extrema_fast;
-pub use file::{Space, Trajectory};
+pub(crate) use file::Space;
+pub use file::Trajectory;
 pub(crate) use fourier::evaluate_series;
 pub use fourier::{Fourier, Series};
 #[doc(hidden)]
 pub use fourier::{RATE, sample_period};
-pub use grid::Grid;
+pub(crate) use grid::Grid;
 #[doc(hidden)]
 pub use samples::Samples;
 #[doc(hidden)]
 pub use table::{Sampled, Table};
-pub use tool::ToolCertificate;
+pub(crate) use tool::ToolCertificate;
 #[doc(hidden)]
 pub use torque::{rate_certificate, torque_certificate};

@@ -13,7 +13,8 @@ pub mod shared;
 pub mod tripod;
 
 use excite::dynamics::Samples;
-use excite::robot::{Body, Inertia, Joint, Limits, Motion, Prior, Robot};
+use excite::robot::parts::{Motion, Prior};
+use excite::robot::{Body, Inertia, Joint, Limits, Robot};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,8 @@
 //! Logs that are read in parts.
 
 use excite::Plant;
-use excite::log::{Purpose, Record};
+use excite::log::Record;
+use excite::log::parts::Purpose;
 use std::path::Path;
 
 /// The parts of a log for the fit, `rows` rows each.

@@ -1,11 +1,14 @@
 //! Rehearsals: a motion is designed, a robot follows it in simulation, and its sensors are read.
 
-use excite::design::{Condition, Settings as Design, design};
-use excite::log::{Channels, Purpose, Record};
+use excite::design::parts::Condition;
+use excite::design::{Settings as Design, design};
+use excite::log::parts::Purpose;
+use excite::log::{Channels, Record};
 use excite::plant::Plant;
 use excite::simulate::record::{Sensors, measure};
 use excite::simulate::{Effects, Settings as Simulation, simulate};
-use excite::trajectory::{Ends, Fourier, Grid};
+use excite::trajectory::Fourier;
+use excite::trajectory::parts::{Ends, Grid};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
 

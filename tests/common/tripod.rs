@@ -2,12 +2,12 @@
 //! platform that translates (a linear Delta). With four rails it is redundantly actuated.
 
 use excite::Result;
+use excite::mechanism::parts::{ClosedForm, Group, Pattern, Segment, Source, Task};
 use excite::mechanism::scalar::Scalar;
 use excite::mechanism::tree::{Builder, Place};
-use excite::mechanism::{
-    ClosedForm, Coordinates, Group, Kinematics, Mechanism, Pattern, Segment, Setup, Source, Task,
-};
-use excite::robot::{JointTerm, Motion};
+use excite::mechanism::{Coordinates, Kinematics, Mechanism, Setup};
+use excite::robot::parts::Motion;
+use excite::robot::{Joint, JointTerm};
 use nalgebra::{Matrix3, Vector3};
 
 #[derive(Debug, Clone)]
@@ -61,16 +61,18 @@ pub fn build(rails: usize, seed: u64) -> Result<Mechanism> {
     let r = &mut super::rng(seed);
     let mut tree = Builder::default();
     for i in 0..rails {
-        tree.coordinate(&format!("slide{i}"), Motion::Prismatic);
-        tree.last().identify = [true, true, false, true];
-        tree.last().terms = [0.7, 3.0, 0.0, -1.0];
+        let mut slide = Joint::new(&format!("slide{i}"), Motion::Prismatic);
+        slide.identify = [true, true, false, true];
+        slide.terms = [0.7, 3.0, 0.0, -1.0];
+        tree.add(slide);
     }
     for i in 0..rails {
         for (k, angle) in ["gamma", "beta"].iter().enumerate() {
-            tree.coordinate(&format!("rod{i}_{angle}"), Motion::Revolute);
+            let mut rod = Joint::new(&format!("rod{i}_{angle}"), Motion::Revolute);
             // friction of a passive joint
-            tree.last().identify = JointTerm::ALL.map(|t| t == JointTerm::Viscous && k == 0);
-            tree.last().terms = [0.0, if k == 0 { 0.4 } else { 0.0 }, 0.0, 0.0];
+            rod.identify = JointTerm::ALL.map(|t| t == JointTerm::Viscous && k == 0);
+            rod.terms = [0.0, if k == 0 { 0.4 } else { 0.0 }, 0.0, 0.0];
+            tree.add(rod);
         }
     }
     let mut groups = Vec::new();

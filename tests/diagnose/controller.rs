@@ -6,12 +6,15 @@ use crate::common::rehearse::{self, Log, without_commands};
 use crate::common::shared::shared;
 use excite::diagnose::controller::{Feedback, Kind, identify};
 use excite::diagnose::evidence::Evidence;
-use excite::diagnose::{Diagnosis, Settings, Verdict, of_logs, prepare};
+use excite::diagnose::parts::Verdict;
+use excite::diagnose::{Diagnosis, Settings, of_logs, prepare};
 use excite::log::{Channels, Experiment, Record};
 use excite::plant::Plant;
-use excite::robot::{Inertia, Prior};
+use excite::robot::Inertia;
+use excite::robot::parts::Prior;
+use excite::simulate::parts::Controller;
 use excite::simulate::record::{Sensors, measure};
-use excite::simulate::{Controller, Effects, Settings as Simulation, simulate};
+use excite::simulate::{Effects, Settings as Simulation, simulate};
 use excite::trajectory::{Fourier, Series};
 use std::f64::consts::TAU;
 

@@ -6,9 +6,11 @@
 use crate::common::noise::normal;
 use crate::common::rng;
 use crate::common::shared::shared;
-use excite::diagnose::{Diagnosis, Settings, Verdict, diagnose, json, of_logs, page, prepare};
+use excite::diagnose::parts::Verdict;
+use excite::diagnose::{Diagnosis, Settings, diagnose, json, of_logs, page, prepare};
 use excite::dynamics::{Samples, Tree};
-use excite::log::{Channels, Experiment, Payload, Purpose, Record};
+use excite::log::parts::{Payload, Purpose};
+use excite::log::{Channels, Experiment, Record};
 use excite::plant::Plant;
 use excite::regressor::nominal_torque;
 use excite::robot::{Inertia, JointTerm};

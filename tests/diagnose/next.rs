@@ -9,7 +9,8 @@ use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
 use excite::identifiability::assess;
 use excite::log::Record;
 use excite::plant::Plant;
-use excite::simulate::{Effects, Field};
+use excite::simulate::Effects;
+use excite::simulate::parts::Field;
 use excite::trajectory::{Fourier, Trajectory};
 
 /// A robot, what it has that its model lacks, and the records of a designed motion.

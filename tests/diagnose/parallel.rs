@@ -9,8 +9,9 @@ use excite::log::Record;
 use excite::mechanism::bundled;
 use excite::plant::Plant;
 use excite::robot::Inertia;
+use excite::simulate::Effects;
 use excite::simulate::effects::parse_payload;
-use excite::simulate::{Effects, Field};
+use excite::simulate::parts::Field;
 use excite::trajectory::Fourier;
 
 /// A robot and a motion for it.

@@ -1,13 +1,15 @@
 //! Recordings of a real arm, as its controller wrote them: standstill at both ends, a person who pushes, a load.
 
 use crate::common::shared::shared;
-use excite::diagnose::{Diagnosis, Settings, Verdict, json, of_logs, page};
+use excite::diagnose::parts::Verdict;
+use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
 use excite::export::{Model, write};
 use excite::identify;
 use excite::load;
 use excite::log::{Experiment, Record};
 use excite::plant::Plant;
-use excite::robot::{JointTerm, Prior};
+use excite::robot::JointTerm;
+use excite::robot::parts::Prior;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 

@@ -3,7 +3,8 @@
 
 use excite::Plant;
 use excite::diagnose::{prepare, second_encoder};
-use excite::log::{Purpose, Record};
+use excite::log::Record;
+use excite::log::parts::Purpose;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 

@@ -4,10 +4,12 @@ use crate::common::parts;
 use crate::common::rehearse;
 use crate::common::shared::shared;
 use excite::Plant;
+use excite::identify::parts::{Merged, Method};
 use excite::identify::{
-    Factor, Merged, Method, Settings, condense, condense_parts, identify, identify_parts, merge,
+    Factor, Settings, condense, condense_parts, identify, identify_parts, merge,
 };
-use excite::log::{Experiment, Outline, Purpose, Record};
+use excite::log::parts::Purpose;
+use excite::log::{Experiment, Outline, Record};
 use excite::robot::JointTerm;
 use excite::simulate::{Effects, Sensors, measure, simulate, to_record};
 use std::ops::ControlFlow;

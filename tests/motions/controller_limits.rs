@@ -3,7 +3,8 @@
 
 use excite::design::{Design, Settings, design};
 use excite::moves::{Move, Settings as MoveSettings, State, rehearse};
-use excite::robot::{Robot, VelocityByPosition};
+use excite::robot::Robot;
+use excite::robot::parts::VelocityByPosition;
 use excite::trajectory::Fourier;
 use excite::{Error, Plant, WarningKind};
 

@@ -1,8 +1,9 @@
 //! What the report before the run states of the platform, the legs and the friction, with and without breakaway friction.
 
 use excite::Plant;
-use excite::design::Question;
-use excite::identifiability::{Answer, assess};
+use excite::design::parts::Question;
+use excite::identifiability::assess;
+use excite::identifiability::parts::Answer;
 use excite::mechanism::{Mechanism, bundled};
 use excite::regressor::term_factor;
 use excite::robot::JointTerm;

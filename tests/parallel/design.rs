@@ -12,7 +12,8 @@ use excite::dynamics::Samples;
 use excite::identifiability::assess;
 use excite::mechanism::Mechanism;
 use excite::robot::{JointTerm, Limits};
-use excite::trajectory::{Basis, Ends, Fourier, Space, Trajectory, certify};
+use excite::trajectory::parts::{Ends, Space};
+use excite::trajectory::{Basis, Fourier, Trajectory, certify};
 use rand::Rng;
 
 /// Hexapod of the reference model with friction, limits and cones.

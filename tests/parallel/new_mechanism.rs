@@ -4,17 +4,19 @@
 //! closed as a loop by Newton's method.
 
 use crate::common::compare::difference;
-use excite::design::{Condition, Settings, design};
+use excite::design::parts::Condition;
+use excite::design::{Settings, design};
 use excite::dynamics::Samples;
 use excite::identifiability::assess;
 use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
+use excite::mechanism::parts::{
+    ClosedForm, Group, MechanismWorkspace, Pattern, Segment, Source, Task,
+};
 use excite::mechanism::scalar::{Pack, Scalar};
 use excite::mechanism::tree::{Builder, Place};
-use excite::mechanism::{
-    ClosedForm, Coordinates, Group, Kinematics, Mechanism, MechanismWorkspace, Pattern, Segment,
-    Setup, Source, Task, TaskDerivatives,
-};
-use excite::robot::{Inertia, JointTerm, Limits, Motion};
+use excite::mechanism::{Coordinates, Kinematics, Mechanism, Setup, TaskDerivatives};
+use excite::robot::parts::Motion;
+use excite::robot::{Inertia, Joint, JointTerm, Limits};
 use excite::{Plant, Result};
 use nalgebra::{Matrix3, Vector3};
 
@@ -95,8 +97,7 @@ fn five_bar() -> Result<Mechanism> {
 fn five_bar_setup() -> Setup {
     let mut tree = Builder::default();
     for k in 1..=2 {
-        tree.coordinate(&format!("motor{k}"), Motion::Revolute);
-        let motor = tree.last();
+        let mut motor = Joint::new(&format!("motor{k}"), Motion::Revolute);
         motor.limits = Limits {
             position: [-1.0, 4.0],
             velocity: 8.0,
@@ -108,6 +109,7 @@ fn five_bar_setup() -> Setup {
         motor.torque_noise = Some(0.02);
         motor.terms = [0.0, 0.05, 0.0, 0.0];
         motor.identify = JointTerm::ALL.map(|t| t == JointTerm::Viscous);
+        tree.add(motor);
     }
     for k in 1..=2 {
         tree.coordinate(&format!("elbow{k}"), Motion::Revolute);

@@ -5,12 +5,15 @@ use crate::common::compare::largest;
 
 use excite::design::criterion::Objective;
 use excite::design::information::{Evaluation, Information};
+use excite::design::parts::Question;
 use excite::design::question::asked;
-use excite::design::{Question, Settings, design};
-use excite::identifiability::{LoadAccuracy, assess};
+use excite::design::{Settings, design};
+use excite::identifiability::assess;
+use excite::identifiability::parts::LoadAccuracy;
 use excite::regressor::term_factor;
 use excite::robot::{Inertia, JointTerm};
-use excite::trajectory::{Basis, Ends, Trajectory, sample_period};
+use excite::trajectory::parts::Ends;
+use excite::trajectory::{Basis, Trajectory, sample_period};
 use excite::{Error, Plant};
 use faer::Mat;
 use rand::Rng;

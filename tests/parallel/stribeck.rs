@@ -2,11 +2,12 @@
 //! and of the files that are written.
 
 use excite::Plant;
-use excite::design::{Question, design};
+use excite::design::design;
+use excite::design::parts::Question;
 use excite::dynamics::Samples;
 use excite::export::{Model, write};
 use excite::identify::{Identification, identify};
-use excite::log::Purpose;
+use excite::log::parts::Purpose;
 use excite::mechanism::{Mechanism, bundled};
 use excite::simulate::{Sensors, Settings, measure, simulate, to_record};
 use excite::trajectory::{Fourier, Series};

@@ -60,7 +60,7 @@ fn results_are_serialised() {
     serialisable::<excite::load::Identified>();
     serialisable::<excite::diagnose::Diagnosis>();
     serialisable::<excite::simulate::Run>();
-    serialisable::<excite::plant::Certified>();
+    serialisable::<excite::plant::parts::Certified>();
 
     serialisable::<excite::signals::Prepared>();
 

@@ -1,7 +1,8 @@
 //! Logs with everything that goes wrong with them.
 
 use excite::Plant;
-use excite::log::{Experiment, Payload, Purpose, Record, Table};
+use excite::log::parts::{Payload, Purpose};
+use excite::log::{Experiment, Record, Table};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

@@ -229,9 +229,11 @@ fn the_cutoff_lies_where_motion_sinks_into_noise() {
 /// of the positions belongs to one of them only.
 #[test]
 fn the_derivation_is_an_option() {
-    use excite::log::{Channels, Purpose, Record};
+    use excite::log::parts::Purpose;
+    use excite::log::{Channels, Record};
     use excite::plant::Plant;
-    use excite::signals::{Derivation, Prepared, Settings};
+    use excite::signals::parts::Derivation;
+    use excite::signals::{Prepared, Settings};
     let plant = Plant::load("planar2").unwrap();
     let (rate, period) = (200.0, 4.0);
     let count = 3 * 800;

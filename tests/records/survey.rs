@@ -31,8 +31,14 @@ fn wrong_statements_are_named_before_a_model_is_made() {
             tau,
             qref: None,
         };
-        excite::log::Record::from_channels("log", channels, &plant, excite::log::Purpose::Fit, None)
-            .unwrap()
+        excite::log::Record::from_channels(
+            "log",
+            channels,
+            &plant,
+            excite::log::parts::Purpose::Fit,
+            None,
+        )
+        .unwrap()
     };
     assert_eq!(
         check(&plant, &[record(q.clone(), tau.clone())]).unwrap(),

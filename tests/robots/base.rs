@@ -2,7 +2,8 @@
 
 use crate::common;
 
-use excite::base::{BaseParameters, Identifiability, random_states};
+use excite::base::parts::Identifiability;
+use excite::base::{BaseParameters, random_states};
 use excite::regressor::Regressor;
 use excite::robot::{JointTerm, Robot};
 use rand::Rng;

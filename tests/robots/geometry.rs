@@ -1,5 +1,10 @@
 //! Volumes of links, where they come from, and the pairs of them that are looked at.
 
+mod meshes;
+mod pairs;
+mod stated;
+mod walls;
+
 use excite::collision::scene::{Obstacle, Scene};
 use excite::robot::geometry::Origin;
 use excite::solid::Shape;
@@ -153,20 +158,6 @@ fn visual_geometry_counts_only_where_there_is_no_other() {
     assert!((inside(&both, "upper", &V::zeros()) + 0.05).abs() < 1e-9);
 }
 
-#[test]
-fn stated_volumes_stand_instead_of_the_geometry_of_their_link() {
-    let more =
-        "[[volume]]\nlink = \"upper\"\nkind = \"sphere\"\ncentre = [0.1, 0.0, 0.0]\nradius = 0.2\n";
-    let robot = stated(&plain(), more);
-    assert!((inside(&robot, "upper", &V::new(0.1, 0.0, 0.0)) + 0.2).abs() < 1e-12);
-    assert!(inside(&robot, "upper", &V::new(0.4, 0.0, 0.0)) > 0.09);
-    let origins = robot.geometry.volumes().links.iter().map(|v| v.origin);
-    assert_eq!(
-        origins.collect::<Vec<_>>(),
-        [Origin::Urdf, Origin::Stated, Origin::Urdf]
-    );
-}
-
 /// A wedge of unequal sides as an OBJ, and its corners.
 fn wedge(size: f64) -> (String, Vec<V>) {
     let corners = [
@@ -212,74 +203,6 @@ fn load(dir: &TempDir, name: &str) -> Plant {
 }
 
 #[track_caller]
-fn holds_wedge(robot: &Robot, corners: &[V], scale: V) {
-    assert!(
-        robot.geometry.volumes().warnings.is_empty(),
-        "{:?}",
-        robot.geometry.volumes().warnings
-    );
-    holds(robot, corners, scale);
-}
-
-#[track_caller]
-fn holds(robot: &Robot, corners: &[V], scale: V) {
-    for c in corners {
-        let p = c.component_mul(&scale) + V::new(0.0, 0.02, 0.0);
-        let d = inside(robot, "upper", &p);
-        assert!((-0.2..=1e-9).contains(&d), "{c}: {d}");
-    }
-}
-
-#[test]
-fn meshes_are_found_and_enclosed() {
-    let (text, corners) = wedge(0.1);
-    let one = V::repeat(1.0);
-    let package = "package://arm_description/meshes/part.obj";
-    for (named, lies) in [
-        ("part.obj", "part.obj"),
-        ("meshes/part.obj", "meshes/part.obj"),
-        (package, "arm_description/meshes/part.obj"),
-        (package, "meshes/part.obj"),
-    ] {
-        let urdf = arm(BASE, &mesh(named, ""), LOWER, "");
-        let dir = folder(&[("arm.urdf", &urdf), (lies, &text)]);
-        holds_wedge(load(&dir, "arm.urdf").robot(), &corners, one);
-    }
-    let urdf = arm(BASE, &mesh(package, ""), LOWER, "");
-    let lies = "elsewhere/arm_description/meshes/part.obj";
-    let file = toml("[collision]\nmeshes = [\"elsewhere\"]\n");
-    let dir = folder(&[
-        ("arm.urdf", &urdf),
-        ("robot.toml", &file),
-        (lies, text.as_str()),
-    ]);
-    holds_wedge(load(&dir, "robot.toml").robot(), &corners, one);
-    // the same file without the statement, and with the folder given to the plant
-    let plant = load(&dir, "arm.urdf");
-    assert_eq!(plant.scene().unwrap().unwrap().unseen, ["upper"]);
-    let plant = plant.with_meshes(&[dir.path().join("elsewhere")]);
-    holds_wedge(plant.robot(), &corners, one);
-    assert!(plant.scene().unwrap().unwrap().unseen.is_empty());
-}
-
-#[test]
-fn meshes_are_scaled_as_the_urdf_says() {
-    let (text, corners) = wedge(100.0);
-    let urdf = arm(
-        BASE,
-        &mesh("part.obj", " scale=\"0.001 0.002 -0.001\""),
-        LOWER,
-        "",
-    );
-    let dir = folder(&[("arm.urdf", &urdf), ("part.obj", &text)]);
-    holds_wedge(
-        load(&dir, "arm.urdf").robot(),
-        &corners,
-        V::new(0.001, 0.002, -0.001),
-    );
-}
-
-#[track_caller]
 fn warned<'a>(all: &'a [Warning], kind: WarningKind, words: &[&str]) -> &'a Warning {
     let fits = |w: &&Warning| {
         let text = w.to_string();
@@ -287,153 +210,6 @@ fn warned<'a>(all: &'a [Warning], kind: WarningKind, words: &[&str]) -> &'a Warn
     };
     let found = all.iter().find(fits);
     found.unwrap_or_else(|| panic!("no {kind:?} with {words:?} in {all:?}"))
-}
-
-#[test]
-fn meshes_that_cannot_be_read_are_told_and_the_robot_is_used_all_the_same() {
-    for (name, content, word) in [
-        ("part.stl", None, "not found"),
-        ("part.stl", Some(""), "no triangle"),
-        ("part.obj", Some(""), "no triangle"),
-        ("part.stl", Some("this is no mesh\nat all"), "no triangle"),
-        ("part.obj", Some("f a b c\n"), "line 1"),
-        ("part.obj", Some("v 0 zero 0\n"), "line 1"),
-        (
-            "part.obj",
-            Some("v 0 0 NaN\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-            "not finite",
-        ),
-        ("part.dae", Some("<COLLADA/>"), "visual_scene"),
-        ("part.ply", Some("ply"), ".ply"),
-    ] {
-        let urdf = arm(BASE, &mesh(name, ""), LOWER, "");
-        let dir = folder(&[("arm.urdf", &urdf)]);
-        if let Some(content) = content {
-            put(dir.path(), name, content);
-        }
-        let plant = load(&dir, "arm.urdf");
-        let scene = plant.scene().unwrap().expect("the other links");
-        warned(
-            &scene.warnings,
-            WarningKind::GeometryUnread,
-            &["link `upper`", word],
-        );
-        warned(
-            &scene.warnings,
-            WarningKind::CollisionNotChecked,
-            &["upper"],
-        );
-        assert_eq!(scene.unseen, ["upper"], "{name} {content:?}");
-        assert!(plant.base().unwrap().count() > 0);
-    }
-}
-
-#[test]
-fn a_mesh_in_millimetres_is_told_and_scaled() {
-    let (text, corners) = wedge(100.0);
-    let urdf = arm(BASE, &mesh("part.obj", ""), LOWER, "");
-    let dir = folder(&[("arm.urdf", &urdf), ("part.obj", &text)]);
-    let plant = load(&dir, "arm.urdf");
-    let scene = plant.scene().unwrap().unwrap();
-    let words = ["link `upper`", "millimetres", "0.001 0.001 0.001"];
-    warned(&scene.warnings, WarningKind::GeometryUnread, &words);
-    assert!(scene.unseen.is_empty(), "{:?}", scene.unseen);
-    holds(plant.robot(), &corners, V::repeat(0.001));
-}
-
-#[test]
-fn statements_that_make_no_sense_are_refused_with_their_line() {
-    let sphere = "[[volume]]\nlink = \"upper\"\nkind = \"sphere\"\n";
-    let cases: Vec<(String, &[&str])> = vec![
-        (
-            sphere.replace("upper", "uper"),
-            &["line 4", "`uper`", "`upper`"],
-        ),
-        (
-            sphere.replace("sphere", "spere"),
-            &["line 5", "`spere`", "sphere"],
-        ),
-        (
-            format!("{sphere}centre = [0, 0, 0]\nradius = -0.1\n"),
-            &["line 5", "radius", "upper"],
-        ),
-        (
-            format!("{sphere}centre = [0, 0]\nradius = 0.1\n"),
-            &["line 5", "centre"],
-        ),
-        (
-            "[[volume]]\nkind = \"sphere\"\n".into(),
-            &["line 4", "link"],
-        ),
-        (
-            "[[volume]]\nlink = \"upper\"\nkind = \"box\"\nsize = [1, 0, 1]\n".into(),
-            &["line 5", "size"],
-        ),
-        (
-            "[[volume]]\nlink = \"upper\"\nkind = \"hull\"\npoints = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]\n".into(),
-            &["line 5", "points", "plane"],
-        ),
-        (
-            "[[volume]]\nlink = \"upper\"\nkind = \"box\"\nsize = [1, 1, 1]\npoints = [[0, 0, 0]]\n".into(),
-            &["`points`", "hull"],
-        ),
-        (
-            "[collision]\nmargin = 5\n".into(),
-            &["line 4", "margin", "5"],
-        ),
-        (
-            "[collision]\nmargin = nan\n".into(),
-            &["line 4", "margin", "NaN"],
-        ),
-        (
-            "[collision]\nignore = [[\"upper\"]]\n".into(),
-            &["line 4", "pairs"],
-        ),
-        (
-            "[collision]\nignore = [[\"base\", \"lowr\"]]\n".into(),
-            &["line 4", "`lowr`", "`lower`"],
-        ),
-        (
-            "[collision]\nflor = true\n".into(),
-            &["line 4", "`flor`", "floor"],
-        ),
-        (
-            "[[keep_in]]\nframe = \"lower\"\nlow = [0, 0, 1]\nhigh = [1, 1, 0]\n".into(),
-            &["line 4", "low", "high"],
-        ),
-        (
-            "[[keep_in]]\nframe = \"lower\"\nlow = [0, 0]\n".into(),
-            &["line 4", "three numbers"],
-        ),
-        (
-            "[[keep_in]]\nframe = \"wrist\"\n".into(),
-            &["line 4", "`wrist`"],
-        ),
-        (
-            "[[obstacle]]\nname = \"wall\"\nkind = \"plane\"\noffset = 1.0\n".into(),
-            &["line 5", "`wall`", "normal"],
-        ),
-        (
-            "[[obstacle]]\nkind = \"plane\"\nnormal = [0, 0, 0]\n".into(),
-            &["line 4", "normal"],
-        ),
-        (
-            "[[obstacle]]\nlink = \"upper\"\nkind = \"plane\"\nnormal = [0, 0, 1]\n".into(),
-            &["line 4", "base frame"],
-        ),
-    ];
-    for (more, words) in cases {
-        let found = Robot::from_toml_str(&toml(&more), &plain(), "robot.toml");
-        let message = found.err().unwrap_or_else(|| panic!("accepted: {more}"));
-        let message = message.to_string();
-        for word in words {
-            assert!(message.contains(word), "no `{word}` in: {message}\n{more}");
-        }
-        assert!(
-            !message.contains('\n') && message.contains("robot.toml"),
-            "{message}"
-        );
-    }
 }
 
 /// Why a pair is left out, in either order.
@@ -448,114 +224,6 @@ fn left_out<'a>(scene: &'a Scene, a: &str, b: &str) -> Option<&'a str> {
 fn looked_at(scene: &Scene, a: &str, b: &str) -> bool {
     let mut names = scene.pairs.iter().map(|p| scene.names(p));
     names.any(|n| n == [a, b] || n == [b, a])
-}
-
-/// The robot file that is written leaves the same pairs out, wherever it goes.
-#[test]
-fn a_written_robot_file_knows_its_srdf() {
-    let file = toml("[collision]\nsrdf = \"arm.srdf\"\n");
-    let dir = folder(&[("arm.urdf", &plain()), ("robot.toml", &file)]);
-    let pair = r#"<robot name="arm"><disable_collisions link1="base" link2="lower"/></robot>"#;
-    put(dir.path(), "arm.srdf", pair);
-    let urdf = dir.path().join("arm.urdf");
-    let written = load(&dir, "robot.toml")
-        .robot()
-        .to_toml_template(&urdf.to_string_lossy());
-    let other = folder(&[("again.toml", &written)]);
-    let scene = load(&other, "again.toml").scene().unwrap().unwrap();
-    assert!(!looked_at(&scene, "base", "lower"));
-}
-
-#[test]
-fn an_srdf_leaves_pairs_out() {
-    let file = toml("[collision]\nsrdf = \"arm.srdf\"\n");
-    let with = |pairs: &[[&str; 2]]| {
-        let mut text = String::from("<robot name=\"arm\">");
-        for [a, b] in pairs {
-            text += &format!(r#"<disable_collisions link1="{a}" link2="{b}" reason="Never"/>"#);
-        }
-        let urdf = plain();
-        let dir = folder(&[("arm.urdf", &urdf), ("robot.toml", &file)]);
-        put(dir.path(), "arm.srdf", &(text + "</robot>"));
-        load(&dir, "robot.toml").scene()
-    };
-    let scene = with(&[]).unwrap().unwrap();
-    assert!(looked_at(&scene, "base", "lower"));
-    let scene = with(&[["lower", "base"]]).unwrap().unwrap();
-    assert!(!looked_at(&scene, "base", "lower"));
-    assert_eq!(
-        left_out(&scene, "base", "lower"),
-        Some("named by the robot file")
-    );
-
-    let scene = with(&[["lower", "base"], ["lower", "gripper"]]).unwrap();
-    let scene = scene.unwrap();
-    assert!(!looked_at(&scene, "base", "lower"));
-    let words = ["`gripper`", "1 of its 2 pairs", "arm.srdf"];
-    warned(&scene.warnings, WarningKind::EntryIgnored, &words);
-
-    let message = with(&[["link1", "link2"]]).unwrap_err().to_string();
-    assert!(
-        message.contains("another robot") && message.contains("`link1`"),
-        "{message}"
-    );
-    let urdf = plain();
-    let dir = folder(&[("arm.urdf", &urdf), ("robot.toml", &file)]);
-    let message = load(&dir, "robot.toml").scene().unwrap_err().to_string();
-    assert!(message.contains("arm.srdf"), "{message}");
-    for text in ["<robot", "<sdf/>"] {
-        put(dir.path(), "arm.srdf", text);
-        let message = load(&dir, "robot.toml").scene().unwrap_err().to_string();
-        assert!(message.contains("arm.srdf"), "{message}");
-    }
-}
-
-#[test]
-fn links_that_a_joint_joins_are_left_out() {
-    let robot = Robot::from_urdf_str(&plain(), "arm.urdf").unwrap();
-    let scene = scene_of(&robot);
-    for (a, b) in [("base", "upper"), ("upper", "lower")] {
-        assert_eq!(left_out(&scene, a, b), Some("joined by a joint"));
-        assert!(!looked_at(&scene, a, b));
-    }
-    assert!(looked_at(&scene, "base", "lower"));
-    assert!(looked_at(&scene, "upper", "floor") && looked_at(&scene, "lower", "floor"));
-    assert!(!looked_at(&scene, "base", "floor"));
-    // what carries a link without volume stands for it
-    let scene = scene_of(&stated(&arm(BASE, "", LOWER, ""), ""));
-    assert_eq!(left_out(&scene, "base", "lower"), Some("joined by a joint"));
-    assert_eq!(scene.unseen, ["upper"]);
-}
-
-#[test]
-fn pairs_that_no_posture_keeps_apart_are_left_out() {
-    let large = r#"<collision><geometry><sphere radius="0.6"/></geometry></collision>"#;
-    let robot = stated(&arm(BASE, UPPER, large, ""), "[collision]\nfloor = false\n");
-    let scene = scene_of(&robot);
-    assert_eq!(
-        left_out(&scene, "base", "lower"),
-        Some("nearer than the margin in every posture")
-    );
-    assert!(!looked_at(&scene, "base", "lower"));
-}
-
-#[test]
-fn fingers_that_follow_one_joint_are_left_out() {
-    let finger = |name: &str, y: &str, mimic: &str| {
-        format!(
-            r#"<link name="{name}"><collision><geometry><box size="0.1 0.02 0.02"/></geometry></collision></link>
-<joint name="{name}_joint" type="prismatic"><parent link="lower"/><child link="{name}"/><origin xyz="0.5 0 0"/><axis xyz="0 {y} 0"/><limit lower="0" upper="0.04" velocity="0.1" effort="10"/>{mimic}</joint>
-"#
-        )
-    };
-    let more = finger("left", "1", "") + &finger("right", "-1", r#"<mimic joint="left_joint"/>"#);
-    let robot = Robot::from_urdf_str(&arm(BASE, UPPER, LOWER, &more), "arm.urdf").unwrap();
-    let scene = scene_of(&robot);
-    assert_eq!(
-        left_out(&scene, "left", "right"),
-        Some("both follow one joint")
-    );
-    assert!(looked_at(&scene, "left", "upper") && looked_at(&scene, "right", "floor"));
 }
 
 fn floors(scene: &Scene) -> usize {
@@ -584,60 +252,6 @@ fn a_base_that_stands_on_its_own_frame_has_a_floor() {
     let scene = scene_of(&stated(&deep, "[collision]\nfloor = true\n"));
     assert_eq!(floors(&scene), 1);
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
-}
-
-#[test]
-fn a_frame_is_kept_in_a_box_without_margin() {
-    let more = "[[keep_in]]\nframe = \"lower\"\nlow = [-1.0, -inf, 0.1]\nhigh = [0.3, inf, inf]\n";
-    let scene = scene_of(&stated(&plain(), more));
-    let kept = scene.pairs.iter().filter(|p| p.margin == 0.0);
-    let mut names: Vec<_> = kept.map(|p| scene.names(p).join(", ")).collect();
-    names.sort();
-    assert_eq!(
-        names,
-        [
-            // x never leaves its low side, and is looked at all the same
-            "origin of lower, keep_in high x",
-            "origin of lower, keep_in low x",
-            "origin of lower, keep_in low z",
-        ]
-    );
-    for q in &scene.free {
-        // the elbow from the shoulder
-        assert!(0.4 * q[0].cos() <= 0.3 && 0.4 + 0.4 * q[0].sin() >= 0.1);
-    }
-    assert!(!scene.free.is_empty());
-}
-
-#[track_caller]
-fn no_room(more: &str, names: &[&str]) {
-    let robot = stated(&plain(), more);
-    let found = Plant::from(robot).scene().map(|s| s.map(|s| s.free.len()));
-    match found {
-        Err(Error::Infeasible(message)) => {
-            for name in names {
-                assert!(message.contains(name), "no {name} in: {message}");
-            }
-        }
-        other => panic!("{other:?}"),
-    }
-}
-
-#[test]
-fn two_walls_without_room_between_them_are_an_error() {
-    let wall = |name: &str, x: f64| {
-        format!(
-            "[[obstacle]]\nname = \"{name}\"\nkind = \"plane\"\nnormal = [{x:?}, 0, 0]\noffset = 0.1\n"
-        )
-    };
-    let more = wall("behind", 1.0) + &wall("ahead", -1.0);
-    no_room(&more, &["lower", "behind", "ahead"]);
-}
-
-#[test]
-fn an_obstacle_around_everything_is_an_error() {
-    let more = "[[obstacle]]\nname = \"crate\"\nkind = \"box\"\nsize = [10, 10, 10]\n";
-    no_room(more, &["upper", "lower", "crate"]);
 }
 
 #[test]

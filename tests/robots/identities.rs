@@ -3,7 +3,8 @@
 
 use crate::common;
 
-use excite::dynamics::{Derivatives, Isa, Samples, Tree, Workspace};
+use excite::dynamics::parts::Derivatives;
+use excite::dynamics::{Isa, Samples, Tree, Workspace};
 use excite::robot::Robot;
 use nalgebra::Vector3;
 use rand::Rng;

@@ -6,9 +6,10 @@ use crate::common::compare::largest;
 use common::parallel;
 use excite::Plant;
 use excite::design::{Settings, design};
-use excite::plant::Column;
 use excite::robot::Robot;
-use excite::trajectory::{Fourier, Proof, Series, Space};
+use excite::robot::parts::Column;
+use excite::trajectory::parts::{Proof, Space};
+use excite::trajectory::{Fourier, Series};
 
 fn plants() -> Vec<Plant> {
     let (model, _) = parallel::reference("sg");

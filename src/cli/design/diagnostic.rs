@@ -5,7 +5,7 @@ use super::{samples, write};
 use excite::design::Settings;
 use excite::design::diagnostic::{Motion, diagnostic_set};
 use excite::identifiability::assess;
-use excite::log::Purpose;
+use excite::log::parts::Purpose;
 use excite::robot::holds_robot;
 use excite::trajectory::Trajectory;
 use excite::{Error, Plant, Result};

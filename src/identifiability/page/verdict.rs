@@ -1,7 +1,7 @@
 //! The verdict in a sentence, built from the facts.
 
 use super::{KNOWN, answer, clearance};
-use crate::collision::build::in_words;
+use crate::collision::in_words;
 use crate::identifiability::{Answer, Assessment, Excitation, LoadAccuracy, Platform};
 use crate::mechanism::PoseKind;
 use crate::plant::PairClearance;

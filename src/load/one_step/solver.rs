@@ -1,6 +1,7 @@
 //! Weighted least squares for deviations, load and friction of every record at once.
 
 use super::spectrum;
+use crate::dot::dot;
 use crate::error::{Error, Result};
 use crate::load::system::{Part, System};
 use faer::Mat;
@@ -163,7 +164,7 @@ impl<'a> Solver<'a> {
                 .map(|(part, r)| {
                     let b = part.stribeck(a, speed);
                     let bb: f64 = b.iter().map(|x| x * x).sum();
-                    let br: f64 = b.iter().zip(r).map(|(x, y)| x * y).sum();
+                    let br = dot(&b, r);
                     if bb > 1e-9 { br * br / bb } else { 0.0 }
                 })
                 .sum()

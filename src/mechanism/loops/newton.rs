@@ -13,12 +13,13 @@
 //! direction `Dw` gives the brackets as coefficients, from which the one unknown is solved.
 
 use super::closure::Chain;
+use super::least_squares::LeastSquares;
 use crate::dynamics::Samples;
 use crate::dynamics::lanes::Isa;
 use crate::mechanism::geometry::{Geometry, Segment};
 use crate::mechanism::scalar::{Dual, Pack, Taylor};
 use crate::mechanism::{Cone, Spread};
-use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
+use nalgebra::{DMatrix, DVector};
 
 type Number = Pack<f64>;
 
@@ -49,44 +50,6 @@ struct Configuration {
     solver: LeastSquares,
     /// `D`, coordinates × task
     d: DMatrix<f64>,
-}
-
-/// `Φ_p⁺` by orthogonal triangularisation with column pivots. (The singular values of nalgebra are
-/// good to 1e-8 only, which is enough to measure with but not to move with.)
-struct LeastSquares {
-    q: DMatrix<f64>,
-    r: DMatrix<f64>,
-    order: PermutationSequence<Dyn>,
-}
-
-impl LeastSquares {
-    fn new(jp: DMatrix<f64>) -> Self {
-        let qr = jp.col_piv_qr();
-        LeastSquares {
-            q: qr.q(),
-            r: qr.r(),
-            order: qr.p().clone(),
-        }
-    }
-
-    /// Smallest and largest pivot; zero where there are fewer rows than columns.
-    fn range(&self) -> (f64, f64) {
-        if self.r.nrows() < self.r.ncols() {
-            return (0.0, self.r.amax());
-        }
-        let pivots = self.r.diagonal().abs();
-        (pivots.min(), pivots.max())
-    }
-
-    /// Not numbers where it is singular.
-    fn solve(&self, b: DVector<f64>) -> DVector<f64> {
-        let mut x = self.q.tr_mul(&b);
-        match self.r.nrows() == self.r.ncols() && self.r.solve_upper_triangular_mut(&mut x) {
-            true => self.order.inv_permute_rows(&mut x),
-            false => x = DVector::from_element(self.r.ncols(), f64::NAN),
-        }
-        x
-    }
 }
 
 impl LoopGeometry {

@@ -1,12 +1,13 @@
 //! Bodies and joints of an MJCF as links and joints.
 
 use super::compiler::Compiler;
+use super::frame::{Frame, joint_of};
 use super::xml::{Element, Node};
 use super::{geom, unit};
 use crate::error::{Error, Result, Warning, WarningKind};
+use crate::robot::Inertia;
 use crate::robot::meant;
 use crate::robot::urdf::{Kind, Limit, Link, UrdfJoint};
-use crate::robot::{Inertia, Placement};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use std::collections::{HashMap, HashSet};
 
@@ -14,28 +15,6 @@ use std::collections::{HashMap, HashSet};
 const WORLD: &str = "world";
 /// Bodies inside one another.
 const DEEPEST: usize = 256;
-
-/// Where something stands on a link.
-#[derive(Clone, Copy)]
-struct Frame {
-    rotation: Matrix3<f64>,
-    position: Vector3<f64>,
-}
-
-impl Frame {
-    /// The frame of the link itself.
-    const ZERO: Frame = Frame {
-        rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-        position: Vector3::new(0.0, 0.0, 0.0),
-    };
-
-    fn then(&self, rotation: &Matrix3<f64>, position: &Vector3<f64>) -> Frame {
-        Frame {
-            rotation: self.rotation * rotation,
-            position: self.position + self.rotation * position,
-        }
-    }
-}
 
 /// A body of the file, and the link that it became.
 #[derive(Debug, Clone)]
@@ -448,36 +427,4 @@ fn floats(node: &Node) -> Error {
     node.error(
         "the robot floats, and only robots on a base that stands are read; remove the joint to bolt it to the ground",
     )
-}
-
-fn joint_of(
-    name: String,
-    kind: Kind,
-    node: &Node,
-    parent: String,
-    child: String,
-    at: Frame,
-) -> UrdfJoint {
-    let axis = Vector3::z();
-    UrdfJoint {
-        name,
-        line: node.line as usize,
-        kind,
-        parent,
-        child,
-        rotation: at.rotation,
-        position: at.position,
-        axis,
-        meant: Placement {
-            axis,
-            rotation: at.rotation,
-            position: meant::position(&at.position, 1.0),
-        },
-        limit: None,
-        by_position: None,
-        mimic: None,
-        damping: 0.0,
-        friction: 0.0,
-        armature: 0.0,
-    }
 }

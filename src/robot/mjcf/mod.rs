@@ -11,6 +11,7 @@
 
 pub(crate) mod body;
 pub(crate) mod compiler;
+mod frame;
 mod geom;
 pub(crate) mod xml;
 

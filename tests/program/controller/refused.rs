@@ -2,7 +2,8 @@
 
 use super::{Folder, altered, designed};
 use excite::controller::FORMATS;
-use excite::trajectory::{Space, Trajectory};
+use excite::trajectory::Trajectory;
+use excite::trajectory::parts::Space;
 use std::path::Path;
 use std::process::Command;
 

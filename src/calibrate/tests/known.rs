@@ -1,9 +1,8 @@
 //! What the file states beside the readings: places of base and target, covariances of poses.
 
-use super::entry::KnownPlace;
-use super::frame::{Frame, exp};
-use super::tests::{after, made, places};
 use super::*;
+use crate::calibrate::entry::KnownPlace;
+use crate::calibrate::frame::{Frame, exp};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3};
 
 fn exact(frame: Frame) -> Option<KnownPlace> {

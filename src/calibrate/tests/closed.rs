@@ -1,18 +1,17 @@
 //! Loops through two arms: Jacobians, what can be told, and a calibration without any instrument.
 
-use super::closed;
-use super::frame::{Frame, exp};
-use super::kin::Kin;
-use super::layout::Start;
-use super::model::{Model, Settings};
-use super::poses;
-use super::tests::{input, measurement, nominal, normal, row};
 use super::*;
+use crate::calibrate::closed;
+use crate::calibrate::frame::{Frame, exp};
+use crate::calibrate::kin::Kin;
+use crate::calibrate::layout::Start;
+use crate::calibrate::model::{Model, Settings};
+use crate::calibrate::poses;
+use crate::calibrate::row::Value;
 use crate::error::Error;
 use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use row::Value;
 use std::path::PathBuf;
 
 /// A column that turns, two arms of six joints, a tool each.

@@ -1,11 +1,10 @@
 //! Files that are not what they say: sockets exchanged, distances that are wrong, another assembly mode, rows that tell
 //! nothing.
 
-use super::frame::{Frame, exp};
-use super::kin::Kin;
-use super::row::Value;
-use super::tests::{input, measurement, normal, row};
 use super::*;
+use crate::calibrate::frame::{Frame, exp};
+use crate::calibrate::kin::Kin;
+use crate::calibrate::row::Value;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

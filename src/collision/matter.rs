@@ -1,0 +1,198 @@
+//! Which pairs of a scene matter: those that can come near and can be kept apart, in many postures.
+
+use super::scene::{Balls, LeftOut, Pair, Partner, Scene, poses};
+use crate::error::{Error, Result, Warning, WarningKind};
+use crate::robot::Robot;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A pair that never has more room than this is left out: nothing can move it, m.
+const HARDLY: f64 = 1e-3;
+/// Room beyond which a posture is spacious, however much more there is, m.
+const FAR: f64 = 0.05;
+/// Two links can hardly be moved apart where their room is less than this, m …
+const SLIM: f64 = 5e-3;
+/// … in this part of the postures.
+const NEARLY_ALL: f64 = 0.9;
+/// They keep this part of their median distance.
+const PART: f64 = 0.5;
+/// Free postures that are kept.
+const KEPT: usize = 400;
+
+impl Scene {
+    /// Looks at the pairs in many postures: leaves out those that no posture keeps apart, and keeps postures
+    /// without contact.
+    pub(super) fn sample(&mut self, robot: &Robot, postures: &[Vec<f64>]) -> Result<()> {
+        if postures.is_empty() {
+            return Ok(());
+        }
+        let balls = Balls::new(self);
+        let mut rooms: Vec<Vec<f64>> = postures
+            .par_iter()
+            .map(|q| {
+                let mut at = Vec::new();
+                poses(robot, q, &mut at);
+                let room = |p: &Pair| match balls.lower_bound(p, &at) - p.margin {
+                    far if far > FAR => far,
+                    _ => self.separation(p, &at).distance - p.margin,
+                };
+                self.pairs.iter().map(room).collect()
+            })
+            .collect();
+        self.own_margins(&mut rooms);
+        // what stands around can be too near for ever only of a body that the base carries
+        let may_stay = |pair: &Pair| match pair.partner {
+            Partner::Volume(_) => true,
+            Partner::Obstacle(_) => {
+                let body = self.volumes[pair.volume].body;
+                pair.margin > 0.0 && body.is_none_or(|b| robot.bodies[b].parent.is_none())
+            }
+        };
+        let never: Vec<bool> = (self.pairs.iter().enumerate())
+            .map(|(p, pair)| may_stay(pair) && rooms.iter().all(|r| r[p] < HARDLY))
+            .collect();
+        let mut always: Vec<[String; 2]> = Vec::new();
+        let mut out = LeftOuts(std::mem::take(&mut self.left_out));
+        for (pair, _) in self.pairs.iter().zip(&never).filter(|(_, n)| **n) {
+            let [a, b] = self.names(pair);
+            out.add(a, b, "nearer than the margin in every posture");
+            let names = [a.to_string(), b.to_string()];
+            if matches!(pair.partner, Partner::Volume(_)) && !always.contains(&names) {
+                always.push(names);
+            }
+        }
+        self.left_out = out.0;
+        if !always.is_empty() {
+            self.warnings.push(Warning::new(
+                WarningKind::CollisionNotChecked,
+                "collisions",
+                format!(
+                    "volumes of {} are near in every posture, so that nothing is known of these: look at the \
+                     meshes, state tighter [[volume]]s, or name the pair in `ignore`",
+                    in_words(&always)
+                ),
+            ));
+        }
+        self.always_near = always;
+        let mut free: Vec<(f64, usize)> = rooms
+            .iter()
+            .enumerate()
+            .map(|(i, r)| {
+                let kept = r.iter().zip(&never).filter(|(_, n)| !**n);
+                (kept.map(|(d, _)| *d).fold(f64::INFINITY, f64::min), i)
+            })
+            .filter(|(room, _)| *room >= 0.0)
+            .collect();
+        if free.is_empty() {
+            return Err(self.no_room(robot, &rooms, &never));
+        }
+        free.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.free = free
+            .iter()
+            .take(KEPT)
+            .map(|(_, i)| postures[*i].clone())
+            .collect();
+        let most = |p: usize| rooms.iter().map(|r| r[p]).fold(0.0, f64::max);
+        self.most = (0..self.pairs.len())
+            .filter(|p| !never[*p])
+            .map(most)
+            .collect();
+        let mut never = never.into_iter();
+        self.pairs.retain(|_| !never.next().unwrap_or(false));
+        Ok(())
+    }
+
+    /// Links that can hardly be moved apart keep `PART` of their median distance over the postures, where that is
+    /// less than the margin and not next to nothing. `rooms`: beyond the margin, posture by posture and pair by pair.
+    fn own_margins(&mut self, rooms: &mut [Vec<f64>]) {
+        let mut links: BTreeMap<[String; 2], Vec<usize>> = BTreeMap::new();
+        for (p, pair) in self.pairs.iter().enumerate() {
+            if matches!(pair.partner, Partner::Volume(_)) {
+                let names = self.names(pair).map(String::from);
+                links.entry(names).or_default().push(p);
+            }
+        }
+        let mut told = Vec::new();
+        for ([a, b], pairs) in links {
+            let nearest = |r: &Vec<f64>| pairs.iter().map(|p| r[*p]).fold(f64::INFINITY, f64::min);
+            let mut room: Vec<f64> = rooms.iter().map(nearest).collect();
+            room.sort_by(f64::total_cmp);
+            let at = |part: f64| room[(part * (room.len() - 1) as f64) as usize];
+            let own = PART * (self.margin + at(0.5));
+            if at(NEARLY_ALL) >= SLIM || own < HARDLY || own >= self.margin {
+                continue;
+            }
+            for &p in &pairs {
+                self.pairs[p].margin = own;
+                for r in rooms.iter_mut() {
+                    r[p] += self.margin - own;
+                }
+            }
+            told.push(format!("{a} and {b} {:.1} mm", 1e3 * own));
+        }
+        if !told.is_empty() {
+            self.warnings.push(Warning::new(
+                WarningKind::MarginReduced,
+                "collisions",
+                format!(
+                    "links that can hardly be moved apart keep half of their median distance instead of {:.1} mm: {}",
+                    1e3 * self.margin,
+                    told.join("; ")
+                ),
+            ));
+        }
+    }
+
+    /// Which pairs leave no free posture: those in contact most often.
+    fn no_room(&self, robot: &Robot, rooms: &[Vec<f64>], never: &[bool]) -> Error {
+        let mut often: Vec<(usize, usize)> = (0..self.pairs.len())
+            .filter(|p| !never[*p])
+            .map(|p| (rooms.iter().filter(|r| r[p] < 0.0).count(), p))
+            .collect();
+        often.sort_by(|a, b| b.cmp(a));
+        let mut named: Vec<String> = Vec::new();
+        for (count, p) in often {
+            let [a, b] = self.names(&self.pairs[p]);
+            let share = 100.0 * count as f64 / rooms.len() as f64;
+            let text = format!("{a} and {b} ({share:.0} %)");
+            if named.len() < 3
+                && !named
+                    .iter()
+                    .any(|n| n.starts_with(&format!("{a} and {b} ")))
+            {
+                named.push(text);
+            }
+        }
+        Error::Infeasible(format!(
+            "{}: none of {} random postures is free of contact at a margin of {} m; most often in contact: \
+             {}. Check [[obstacle]], `floor` and `margin`, name pairs that may touch in `ignore`, or look at \
+             no collision (--no-collision)",
+            robot.name,
+            rooms.len(),
+            self.margin,
+            named.join(", ")
+        ))
+    }
+}
+
+/// Pairs of names that are left out, each once.
+#[derive(Default)]
+pub(super) struct LeftOuts(pub(super) Vec<LeftOut>);
+
+impl LeftOuts {
+    pub(super) fn add(&mut self, a: &str, b: &str, why: &str) {
+        let known = |l: &LeftOut| l.between[0] == a && l.between[1] == b;
+        if !self.0.iter().any(known) {
+            self.0.push(LeftOut {
+                between: [a.into(), b.into()],
+                why: why.into(),
+            });
+        }
+    }
+}
+
+/// `a and b; c and d`.
+pub fn in_words(pairs: &[[String; 2]]) -> String {
+    let each: Vec<String> = pairs.iter().map(|[a, b]| format!("{a} and {b}")).collect();
+    each.join("; ")
+}
