@@ -2,8 +2,10 @@
 //! shares nothing with the library: torques at an instant, damping that is integrated implicitly, dry friction that
 //! reverses before the velocity does, motions that do not repeat.
 
-use excite::diagnose::{Diagnosis, Settings, Verdict, of_logs};
-use excite::log::{Channels, Purpose, Record};
+use excite::diagnose::parts::Verdict;
+use excite::diagnose::{Diagnosis, Settings, of_logs};
+use excite::log::parts::Purpose;
+use excite::log::{Channels, Record};
 use excite::plant::Plant;
 use excite::robot::Robot;
 use std::f64::consts::PI;
