@@ -17,9 +17,9 @@ fn shown(file: &str) -> Vec<String> {
         .collect()
 }
 
-/// A stage shows names, no modules: what a user needs is re-exported by its `mod.rs`.
+/// A stage shows names, and one module `parts` of what these are made of: what a user needs is re-exported by its `mod.rs`.
 #[test]
-fn stages_show_names_and_no_modules() {
+fn stages_show_names_and_no_module_but_parts() {
     let stages = shown("lib.rs");
     assert!(stages.len() < 20, "{stages:?}");
     for stage in ["design", "identify", "load", "diagnose", "simulate"] {
@@ -29,7 +29,10 @@ fn stages_show_names_and_no_modules() {
         let path = format!("{}/src/{stage}/mod.rs", env!("CARGO_MANIFEST_DIR"));
         if std::path::Path::new(&path).exists() {
             let modules = shown(&format!("{stage}/mod.rs"));
-            assert!(modules.is_empty(), "{stage} shows {modules:?}");
+            assert!(
+                modules.iter().all(|m| m == "parts"),
+                "{stage} shows {modules:?}"
+            );
         }
     }
 }
