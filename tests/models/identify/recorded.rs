@@ -12,7 +12,10 @@ fn recorded(name: &str) -> Option<Experiment> {
 fn a_test_without_its_recordings_says_so() {
     let nothing = tempfile::tempdir().unwrap();
     let out = std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["identify::recorded::emps_gives_the_published_values", "--exact"])
+        .args([
+            "identify::recorded::emps_gives_the_published_values",
+            "--exact",
+        ])
         .env("EXCITE_SHARED", nothing.path())
         .output()
         .unwrap();
