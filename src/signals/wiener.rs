@@ -18,8 +18,8 @@ pub const BAND: f64 = 30.0;
 /// About where the low-pass of a motion that does not repeat cuts off, Hz.
 pub const SMOOTH: f64 = 12.0;
 
-/// Weight about [`SMOOTH`] below which an encoder is coarse.
-const RESOLVED: f64 = 0.5;
+/// Share of the power of the acceleration that is noise, from which on an encoder is coarse: 4 % of its amplitude.
+const COARSE: f64 = 2e-3;
 
 /// Stretch of a record that its spectrum is averaged over, s.
 const STRETCH: f64 = 2.0;
@@ -164,8 +164,8 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// For positions that noise of this variance is on, sampled every `dt` seconds; `None` where they are resolved up to
-    /// the cut-off of the low-pass alone.
+    /// For positions that noise of this variance is on, sampled every `dt` seconds; `None` where the
+    /// noise is a small part of the acceleration that the low-pass leaves.
     pub fn of(q: &[f64], variance: f64, dt: f64) -> Option<Filter> {
         let count = q.len();
         let length = ((STRETCH / dt) as usize).clamp(64, (count / 2).max(64));
@@ -176,26 +176,22 @@ impl Filter {
         let weight: Vec<f64> = (0..f.len())
             .map(|k| if k == 0 { 1.0 } else { of(k) })
             .collect();
-        let line = |frequency: f64| ((frequency / f[1]).round() as usize).min(weight.len() - 1);
-        let mut about = weight[line(0.75 * SMOOTH)..=line(1.25 * SMOOTH)].to_vec();
-        about.sort_by(f64::total_cmp);
-        (about[about.len() / 2] < RESOLVED).then(|| Filter {
+        let half = half_width(dt);
+        // power of the acceleration that the low-pass leaves: of the noise, and of all
+        let left = |k: usize| response(f[k] * dt, half).powi(2) * f[k].powi(4);
+        let power =
+            |of: &dyn Fn(usize) -> f64| -> f64 { (1..f.len()).map(|k| left(k) * of(k)).sum() };
+        let share = power(&|_| noise) / power(&|k| density[k]).max(1e-300);
+        (share > COARSE).then_some(Filter {
             weight,
             apart: f[1] * dt,
-            half: half_width(dt),
+            half,
         })
     }
 
     /// What is left of the amplitude at a frequency, over the sampling rate.
     pub fn gain(&self, frequency: f64) -> f64 {
-        let x = PI * frequency;
-        let half = self.half as f64;
-        // a triangle is two boxes
-        let once = match x.sin() == 0.0 {
-            true => 1.0,
-            false => ((half * x).sin() / (half * x.sin())).powi(2),
-        };
-        self.weight(frequency) * (2.0 * once - once * once).powi(2)
+        self.weight(frequency) * response(frequency, self.half)
     }
 
     /// The weight at a frequency, over the sampling rate.
@@ -226,6 +222,17 @@ impl Filter {
         let kept: Vec<f64> = (0..count).map(|i| level(i) + back[i]).collect();
         low_pass(&kept, self.half)
     }
+}
+
+/// What [`low_pass`] leaves of the amplitude at a frequency, over the sampling rate.
+fn response(frequency: f64, half: usize) -> f64 {
+    let (x, half) = (PI * frequency, half as f64);
+    // a triangle is two boxes
+    let once = match x.sin() == 0.0 {
+        true => 1.0,
+        false => ((half * x).sin() / (half * x.sin())).powi(2),
+    };
+    (2.0 * once - once * once).powi(2)
 }
 
 /// A low-pass without phase: moving averages shrink curvature; doing it twice and adding the difference back undoes the
@@ -285,4 +292,57 @@ pub fn triangle(x: &[f64], w: usize) -> Vec<f64> {
             sum / weight
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_response_of_the_low_pass_is_what_it_leaves_of_a_sine() {
+        for half in [1, 5, 11] {
+            for frequency in [0.004, 0.02, 0.05] {
+                let x: Vec<f64> = (0..2000)
+                    .map(|i| (2.0 * PI * frequency * i as f64).sin())
+                    .collect();
+                let y = low_pass(&x, half);
+                let (mut with, mut own) = (0.0, 0.0);
+                for i in 200..1800 {
+                    with += x[i] * y[i];
+                    own += x[i] * x[i];
+                }
+                let left = response(frequency, half);
+                assert!(
+                    (with / own - left).abs() < 1e-9,
+                    "{half} {frequency}: {left}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn coarse_steps_are_filtered_and_fine_ones_are_not() {
+        let dt = 0.002;
+        let smooth: Vec<f64> = (0..8000)
+            .map(|i| (2.0 * PI * 0.4 * dt * i as f64).sin())
+            .collect();
+        let stepped =
+            |tick: f64| -> Vec<f64> { smooth.iter().map(|q| (q / tick).round() * tick).collect() };
+        let of = |tick: f64| Filter::of(&stepped(tick), tick * tick / 12.0, dt);
+        assert!(of(2.0 * PI / 1e6).is_none());
+        let coarse = 2.0 * PI / 4096.0;
+        let filter = of(coarse).expect("a coarse encoder");
+        // the second differences come near those of the motion
+        let rough = |x: &[f64]| -> f64 {
+            (500..7500)
+                .map(|i| {
+                    let bent = |x: &[f64]| (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (dt * dt);
+                    (bent(x) - bent(&smooth)).powi(2)
+                })
+                .sum::<f64>()
+                .sqrt()
+        };
+        let plain = low_pass(&stepped(coarse), half_width(dt));
+        assert!(rough(&filter.pass(&stepped(coarse))) < 0.3 * rough(&plain));
+    }
 }
