@@ -1,10 +1,12 @@
 //! Time of the closed-chain regressor, one core: `cargo bench --bench hexapod`.
 
-use excite::dynamics::{Samples, Workspace};
+use excite::dynamics::Samples;
+use excite::dynamics::parts::Workspace;
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart, Leg, joint_frame};
 use excite::mechanism::parts::MechanismWorkspace;
 use excite::mechanism::{MechanismMotion, TaskDerivatives};
-use excite::robot::{Inertia, Limits};
+use excite::robot::Inertia;
+use excite::robot::parts::Limits;
 use nalgebra::{Matrix3, Vector3};
 use std::time::Instant;
 

@@ -12,7 +12,8 @@
 
 use excite::Robot;
 use excite::dynamics::parts::Derivatives;
-use excite::dynamics::{Isa, Samples, Tree, Workspace};
+use excite::dynamics::parts::Workspace;
+use excite::dynamics::{Isa, Samples, Tree};
 use excite::regressor::Regressor;
 use rand::{Rng, SeedableRng};
 use std::hint::black_box;

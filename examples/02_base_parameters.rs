@@ -2,7 +2,7 @@
 
 use excite::base::BaseParameters;
 use excite::base::parts::Identifiability;
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::{Error, Robot};
 
 fn main() -> Result<(), Error> {

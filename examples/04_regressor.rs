@@ -1,7 +1,8 @@
 //! The regressor and the inverse dynamics of many samples at once, without allocation in the loop.
 
 use excite::base::random_states;
-use excite::dynamics::{Tree, Workspace};
+use excite::dynamics::Tree;
+use excite::dynamics::parts::Workspace;
 use excite::{Error, Robot};
 
 fn main() -> Result<(), Error> {

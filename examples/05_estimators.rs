@@ -8,7 +8,7 @@ use excite::identify::parts::{Consistency, Method};
 use excite::identify::{Settings, identify};
 use excite::log::Record;
 use excite::log::parts::{Payload, Purpose};
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::{Plant, Robot};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -10,7 +10,8 @@ use excite::identify::{Settings, identify};
 use excite::log::Record;
 use excite::log::parts::Purpose;
 use excite::mechanism::{Mechanism, bundled};
-use excite::simulate::{Run, Sensors, Settings as Simulation, measure, simulate, to_record};
+use excite::simulate::parts::Sensors;
+use excite::simulate::{Run, Settings as Simulation, measure, simulate, to_record};
 use excite::trajectory::parts::Ends;
 use excite::{Plant, Result};
 

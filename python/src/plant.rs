@@ -5,7 +5,7 @@ use crate::error::{argument, internal, notices};
 use excite::dynamics::Samples;
 use excite::plant::Plant as Core;
 use excite::regressor::Regressor;
-use excite::robot::Limits;
+use excite::robot::parts::Limits;
 use excite::robot::parts::Motion;
 use excite::trajectory::parts::Space;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
@@ -226,7 +226,7 @@ impl Plant {
             return Err(internal("one number for each parameter"));
         }
         let robot = core.with_values(&phi);
-        let model = excite::export::Model {
+        let model = excite::export::parts::Model {
             plant: core,
             robot: &robot,
             remarks: &[],

@@ -3,7 +3,8 @@
 use crate::call::simply;
 use crate::error::{notices, to_python};
 use excite::export::parts::Edited;
-use excite::export::{Model, Remark, into_scene};
+use excite::export::parts::Model;
+use excite::export::{Remark, into_scene};
 use excite::robot::Robot;
 use excite::{Error, Plant, Warning};
 use pyo3::prelude::*;

@@ -62,9 +62,10 @@ pub use file::Calibration;
 pub use file::{EFFECTS, is_calibration};
 pub(crate) use frame::Frame;
 pub use model::Settings;
+pub(crate) use open::Opened;
+pub use open::open;
 #[doc(hidden)]
 pub use open::open_pair;
-pub use open::{Opened, open};
 pub use result::Calibrated;
 
 use crate::error::Result;

@@ -6,6 +6,7 @@ pub use super::identifiable::{Confounded, Identifiability};
 pub use super::judge::{Errors, Stats};
 pub use super::kind::Kind;
 pub use super::model::Algorithm;
+pub use super::open::Opened;
 pub use super::result::{DistanceResult, GroupResult, Identified, Outlier, RowResult};
 pub use super::select::Trial;
 pub use super::unknown::{Part, Unknown};

@@ -4,8 +4,9 @@ pub mod diagnostic;
 
 use super::{load, pretty, print, summary::summary, warn, write};
 use excite::design::diagnostic::PERIODS;
+use excite::design::parts::Control;
 use excite::design::parts::{Condition, Progress, Question};
-use excite::design::{Control, Criterion, Settings, design_with};
+use excite::design::{Criterion, Settings, design_with};
 use excite::identifiability::assess;
 use excite::identifiability::{json::json, page};
 use excite::output::prepare_dir;

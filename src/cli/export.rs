@@ -2,7 +2,8 @@
 
 use super::{Folder, into, print, unwritten, warn};
 use excite::controller::{Card, Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
-use excite::export::{self, Model, write};
+use excite::export::parts::Model;
+use excite::export::{self, write};
 use excite::mechanism::bundled as parallel;
 use excite::output::write_atomic;
 use excite::report::format::unit_of;

@@ -1,12 +1,13 @@
 //! `excite identify EXPERIMENT`.
 
 use super::{Folder, into, outside, pretty, print, unwritten, warn};
-use excite::export::{self, Model};
+use excite::export;
+use excite::export::parts::Model;
 use excite::identify::page;
 use excite::identify::parts::{Consistency, Method};
 use excite::identify::{Identification, Settings, condense_parts, identify, identify_parts, json};
 use excite::log::{Outline, Record};
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::{Plant, Result, Warning, WarningKind, survey};
 use std::fmt::Write as _;
 use std::path::PathBuf;

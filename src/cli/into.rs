@@ -1,8 +1,9 @@
 //! `--into SCENE`: the result in a copy of the user's own file.
 
 use super::Folder;
+use excite::export::into_scene;
 use excite::export::parts::Edited;
-use excite::export::{Model, into_scene};
+use excite::export::parts::Model;
 use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,8 @@
 
 use super::{Folder, outside, pretty, print, unwritten, warn, write};
 use clap::ValueEnum;
-use excite::export::{self, Model};
+use excite::export;
+use excite::export::parts::Model;
 use excite::load::parts::{Method, Parameters};
 use excite::load::{self, Identified, Settings};
 use excite::log::Experiment;

@@ -2,7 +2,8 @@
 
 use super::identify::{columns, consistency};
 use super::{Folder, into, pretty, print, unwritten, warn};
-use excite::export::{self, Model};
+use excite::export;
+use excite::export::parts::Model;
 use excite::identify::parts::Method;
 use excite::identify::{Factor, Settings, merge};
 use excite::report::format::percent;

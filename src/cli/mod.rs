@@ -22,7 +22,7 @@ mod summary;
 mod torque;
 
 use clap::{Parser, Subcommand};
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::{Error, Plant, Result, Warning, WarningKind};
 use std::ffi::OsString;
 use std::io::Write;

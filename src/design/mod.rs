@@ -45,7 +45,8 @@ mod torque_rate;
 pub(crate) use criterion::Condition;
 pub use criterion::Criterion;
 pub(crate) use purpose::Question;
-pub use result::{Control, Design};
+pub(crate) use result::Control;
+pub use result::Design;
 pub use settings::Settings;
 
 use crate::base::BaseParameters;
@@ -95,7 +96,8 @@ pub fn design(plant: &Plant, settings: &Settings) -> Result<Design> {
 ///
 /// ```
 /// use excite::Plant;
-/// use excite::design::{Control, Settings, design_with};
+/// use excite::design::{Settings, design_with};
+/// use excite::design::parts::Control;
 /// use excite::design::parts::Progress;
 ///
 /// let plant = Plant::load("planar2")?;

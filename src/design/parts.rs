@@ -3,4 +3,4 @@
 pub use super::criterion::Condition;
 pub use super::purpose::Question;
 pub use super::record::{Record, Status};
-pub use super::result::Progress;
+pub use super::result::{Control, Progress};

@@ -16,7 +16,7 @@
 use super::column::Column;
 use super::data::Data;
 use super::decoy;
-use super::evidence::{Evidence, Projected};
+use super::evidence::{Evidence, Fit, Projected};
 use super::thresholds::THRESHOLDS as T;
 use crate::error::Result;
 use crate::log::{self, Payload, Purpose};
@@ -76,31 +76,29 @@ fn among(data: &Data, tool: usize) -> Result<Option<Carried>> {
     }
     let evidence = Evidence::new(data, 1.0);
     let before = evidence.fit(&[]).gain;
-    let try_one = |columns: &[Column]| -> (f64, Vec<f64>, Projected) {
+    let try_one = |columns: &[Column]| -> (f64, Fit, Projected) {
         let projected = evidence.project(columns);
         let fit = evidence.fit(&[&projected]);
-        (fit.gain - before, fit.eta, projected)
+        (fit.gain - before, fit, projected)
     };
     let in_all = try_one(&columns).0;
-    let mut best: Option<(f64, Vec<f64>, Projected, Vec<usize>)> = None;
+    let mut best: Option<(f64, Fit, Projected, Vec<usize>)> = None;
     for set in sets {
-        let (gain, eta, projected) = try_one(&only(data, &columns, &set));
+        let (gain, fit, projected) = try_one(&only(data, &columns, &set));
+        let eta = &fit.eta;
         let lever = (eta[1].powi(2) + eta[2].powi(2) + eta[3].powi(2)).sqrt();
         let able = eta[0] > 0.0 && lever < T.carried.reach * eta[0];
         if able && best.as_ref().is_none_or(|b| gain > b.0) {
-            best = Some((gain, eta, projected, set));
+            best = Some((gain, fit, projected, set));
         }
     }
-    let Some((gain, eta, projected, set)) = best else {
+    let Some((gain, fit, projected, set)) = best else {
         return Ok(None);
     };
     let own = only(data, &columns, &set);
-    let decoys = decoy::largest(&evidence, (&own, &projected), &eta, &[], gain);
+    let decoys = decoy::largest(&evidence, (&own, &projected), &fit.eta, &[], gain);
     let unsteady = unsteady(data, &evidence, &own, &set, before, gain);
-    let sure = evidence.fit(&[&projected]).covariance[0][0]
-        .max(0.0)
-        .sqrt()
-        .max(1e-300);
+    let sure = fit.covariance[0][0].max(0.0).sqrt().max(1e-300);
     let explains = explained(data, &evidence, &projected, &set);
     let confidence = T.confidence.surprise.above(gain)
         * T.confidence.decoys.below(decoys)
@@ -109,7 +107,7 @@ fn among(data: &Data, tool: usize) -> Result<Option<Carried>> {
         * T.carried
             .beyond
             .above(1.0 - in_all.max(0.0) / gain.max(1e-9))
-        * T.carried.mass.above(eta[0] / sure);
+        * T.carried.mass.above(fit.eta[0] / sure);
     Ok((confidence >= T.confidence.claim).then(|| {
         let mut records: Vec<usize> = set.iter().map(|k| data.records[*k].order).collect();
         records.sort_unstable();

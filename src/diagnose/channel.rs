@@ -18,7 +18,6 @@ use super::column::Column;
 use super::data::Data;
 use super::evidence::Evidence;
 use super::thresholds::THRESHOLDS as T;
-use crate::signals::series::Series;
 use std::borrow::Cow;
 
 /// What the records say of it.
@@ -100,14 +99,13 @@ impl Data<'_> {
 
     /// Whether the encoder of actuator `j` is coarse in any record.
     pub(super) fn filtered(&self, j: usize) -> bool {
-        let coarse = |r: &Series| r.filters.get(j).is_some_and(Option::is_some);
-        self.records.iter().any(coarse)
+        self.records.iter().any(|r| r.filter(j).is_some())
     }
 
     /// What the filters of the positions leave of a signal.
     fn passed(&self, j: usize, mut x: Vec<f64>) -> Vec<f64> {
         for (k, r) in self.records.iter().enumerate() {
-            if let Some(Some(filter)) = r.filters.get(j) {
+            if let Some(filter) = r.filter(j) {
                 let span = self.span(k);
                 let piece = filter.pass(&x[span.clone()]);
                 x[span].copy_from_slice(&piece);
@@ -142,29 +140,24 @@ impl Data<'_> {
 
     /// Second differences of a modelled torque: what a wider window would change.
     pub fn curvature(&self, model: &[Vec<f64>]) -> Column {
-        let rows = model.iter().enumerate().map(|(j, model)| {
-            let mut out = vec![0.0; self.rows()];
-            for k in 0..self.records.len() {
-                let span = self.span(k);
-                for i in span.start + 1..span.end - 1 {
-                    out[i] = 0.5 * (model[i - 1] - 2.0 * model[i] + model[i + 1]);
-                }
-            }
-            (j, out)
-        });
-        Column {
-            rows: rows.collect(),
-        }
+        self.differences(model, |[before, here, after]| {
+            0.5 * (before - 2.0 * here + after)
+        })
     }
 
     /// First differences of a modelled torque: what a stamp that is late by a sample would change.
     pub fn slope(&self, model: &[Vec<f64>]) -> Column {
+        self.differences(model, |[before, _, after]| 0.5 * (after - before))
+    }
+
+    /// A difference of a modelled torque from three samples each; 0 at the ends of records.
+    fn differences(&self, model: &[Vec<f64>], of: impl Fn([f64; 3]) -> f64) -> Column {
         let rows = model.iter().enumerate().map(|(j, model)| {
             let mut out = vec![0.0; self.rows()];
             for k in 0..self.records.len() {
                 let span = self.span(k);
                 for i in span.start + 1..span.end - 1 {
-                    out[i] = 0.5 * (model[i + 1] - model[i - 1]);
+                    out[i] = of([model[i - 1], model[i], model[i + 1]]);
                 }
             }
             (j, out)

@@ -228,14 +228,19 @@ pub fn of_logs(
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
     let at_rest = at_rest::find(&data, &units);
     warnings.extend(at_rest::warnings(&at_rest));
+    let left = too_much(&residual_gap, &data);
+    let honest = match (decision.verdict, left) {
+        (Verdict::NoGap, true) => Verdict::Unknown,
+        (verdict, _) => verdict,
+    };
     let verdict = match (data.moves(), &carried) {
         // nothing was compared
         (false, _) => Verdict::Unknown,
-        (true, None) => honest(decision.verdict, &residual_gap, &data),
+        (true, None) => honest,
         (true, Some(load)) => {
             let body = finding::carried(&evidence, &cx, &phi_after, load, effects.as_slice());
             findings.splice(0..0, body);
-            match honest(decision.verdict, &residual_gap, &data) {
+            match honest {
                 Verdict::NoGap => Verdict::Explained,
                 Verdict::Unknown => Verdict::PartlyExplained,
                 other => other,
@@ -271,6 +276,7 @@ pub fn of_logs(
         moves: data.moves(),
         at_rest,
         second_encoder,
+        stands_out: decision.stands_out || left,
         unexplained: if data.moves() {
             decision.unexplained
         } else {
@@ -291,13 +297,10 @@ pub fn of_logs(
     })
 }
 
-/// `no_gap` only where the refit leaves no more than a sound model does on any joint, counted as the report
-/// counts it: `unknown` otherwise.
-fn honest(verdict: Verdict, refit: &[JointGap], data: &Data) -> Verdict {
+/// Whether the refit leaves more on any joint than a sound model does, counted as the report counts it: `no_gap` is not
+/// said then.
+fn too_much(refit: &[JointGap], data: &Data) -> bool {
     let left = |g: &JointGap| (g.rms / g.noise.max(1e-300)).powi(2);
-    let too_much = |(j, g): (usize, &JointGap)| left(g) > T.gap.left * data.allowance(j);
-    match verdict == Verdict::NoGap && refit.iter().enumerate().any(too_much) {
-        true => Verdict::Unknown,
-        false => verdict,
-    }
+    let mut joints = refit.iter().enumerate();
+    joints.any(|(j, g)| left(g) > T.gap.left * data.allowance(j))
 }

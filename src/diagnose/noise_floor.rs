@@ -21,15 +21,21 @@ impl Data<'_> {
             })
             .collect();
         let dt = used().find(|r| r.cycle.is_some()).map(|r| r.dt);
-        if let Some(dt) = dt {
-            let mut noise = Noise::from_periods(&parts, dt);
-            noise.limit(self.plant.actuators()[j].torque_noise);
-            noise.at_least(self.least_noise(j), self.filtered(j));
-            let excess = self.position_excess(j);
-            noise.with_excess(&excess);
-            return noise;
-        }
-        // without repetition: the torque above the band of the motion, where the actuator moves
+        let mut noise = match dt {
+            Some(dt) => {
+                let mut noise = Noise::from_periods(&parts, dt);
+                noise.limit(self.plant.actuators()[j].torque_noise);
+                noise
+            }
+            None => self.noise_above_the_band(j),
+        };
+        noise.at_least(self.least_noise(j), self.filtered(j));
+        noise.with_excess(&self.position_excess(j));
+        noise
+    }
+
+    /// Without repetition: the torque above the band of the motion, where the actuator moves.
+    fn noise_above_the_band(&self, j: usize) -> Noise {
         let longest = self.records.iter().max_by_key(|r| r.counts(j));
         // `prepare` refuses an experiment without a record to fit to
         let r = longest.expect("there are records");
@@ -37,11 +43,7 @@ impl Data<'_> {
             run if run.len() >= 2 * LINES => &r.torque(j)[run],
             _ => r.torque(j),
         };
-        let mut noise = Noise::from_residual(x, r.dt, T.noise.above * r.band);
-        noise.at_least(self.least_noise(j), self.filtered(j));
-        let excess = self.position_excess(j);
-        noise.with_excess(&excess);
-        noise
+        Noise::from_residual(x, r.dt, T.noise.above * r.band)
     }
 
     /// Records that tell the noise. Those of the holdout may hold what the fitted ones do not: only where those do not
@@ -63,6 +65,11 @@ impl Data<'_> {
     /// Least noise of an actuator: a share of the torques in the fitted records. A simulator's log has none at all, and
     /// what its steps leave would be a gap.
     fn least_noise(&self, j: usize) -> f64 {
+        T.noise.of_torque * self.torque_rms(j)
+    }
+
+    /// Root mean square of the torques of an actuator in the fitted records.
+    fn torque_rms(&self, j: usize) -> f64 {
         let (mut power, mut count) = (0.0, 0.0f64);
         for r in self.records.iter().filter(|r| r.fit) {
             let heard = self.heard(r, j);
@@ -72,7 +79,7 @@ impl Data<'_> {
                 count += 1.0;
             });
         }
-        T.noise.of_torque * (power / count.max(1.0)).sqrt()
+        (power / count.max(1.0)).sqrt()
     }
 
     /// Factor on the gap per row that a sound model may leave on an actuator: more than 1 where its encoder is coarse and
@@ -82,27 +89,23 @@ impl Data<'_> {
         if !self.filtered(j) {
             return 1.0;
         }
-        let share = T.noise.of_coarse / T.noise.of_torque;
-        let floor = share * self.least_noise(j) / self.noise[j].std;
-        floor.powi(2).max(1.0)
+        let left = T.noise.of_coarse * self.torque_rms(j) / self.noise[j].std;
+        left.powi(2).max(1.0)
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.
     fn position_excess(&self, j: usize) -> Vec<f64> {
         let mut out = vec![0.0; LINES + 1];
-        let coarse = |r: &Series| r.filters.get(j).is_some_and(Option::is_some);
         let records: Vec<&Series> = (self.telling())
-            .filter(|r| r.cycle.is_some() || coarse(r))
+            .filter(|r| r.cycle.is_some() || r.filter(j).is_some())
             .collect();
         for r in &records {
             let variance = (self.inertia[j] * r.position_noise[j]).powi(2) / records.len() as f64;
             for (l, out) in out.iter_mut().enumerate() {
                 let f = l as f64 / (2.0 * r.dt * LINES as f64);
                 // the model from positions that passed a filter passes it once more
-                let left = match r.filters.get(j) {
-                    Some(Some(filter)) => filter.gain(f * r.dt).powi(4),
-                    _ => 1.0,
-                };
+                let passed = r.filter(j).map(|filter| filter.gain(f * r.dt).powi(4));
+                let left = passed.unwrap_or(1.0);
                 let w = 2.0 * std::f64::consts::PI * f.min(T.noise.resolved);
                 *out += left * variance * w.powi(4);
             }
@@ -162,11 +165,8 @@ impl Data<'_> {
                 // with what the filters of coarse encoders took: the noise of the channel is above them, too
                 let passed = self.torque(j);
                 let taken = self.tau[j].iter().zip(passed.iter());
-                let whole: Vec<f64> = taken
-                    .map(|(a, b)| a - b)
-                    .zip(&residual[j])
-                    .map(|(d, e)| d + e)
-                    .collect();
+                let rows = taken.zip(&residual[j]);
+                let whole: Vec<f64> = rows.map(|((raw, left), e)| raw - left + e).collect();
                 let e = self.counted_residual(j, &whole);
                 if !e.is_empty() {
                     self.noise[j] = Noise::from_residual(&e, dt, band);

@@ -9,7 +9,6 @@ mod simulators;
 mod summary;
 
 use super::finding::Finding;
-use super::gap::JointGap;
 use super::result::Diagnosis;
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::Verdict;
@@ -89,7 +88,7 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                     f.title,
                     percent(f.confidence)
                 ),
-                None if !stands_out(d) => "Unknown: a refit explains the torques, with parameters farther from those of the robot file than \
+                None if !d.stands_out => "Unknown: a refit explains the torques, with parameters farther from those of the robot file than \
                      such a model may be, and no effect of the catalogue accounts for that."
                     .into(),
                 None => {
@@ -98,12 +97,6 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             },
         ),
     }
-}
-
-/// Whether a refit of the nominal parameters leaves more on any joint than a sound model does.
-fn stands_out(d: &Diagnosis) -> bool {
-    let left = |g: &JointGap| (g.rms / g.noise).powi(2);
-    d.refit.iter().any(|g| left(g) > T.gap.sound)
 }
 
 fn claims(d: &Diagnosis) -> Vec<&Finding> {

@@ -67,6 +67,8 @@ pub struct Diagnosis {
     pub at_rest: Vec<AtRest>,
     /// what second encoders show of the joints that have one
     pub second_encoder: Vec<SecondEncoder>,
+    /// whether a refit of the nominal parameters leaves more on a joint than a sound model does
+    pub stands_out: bool,
     /// share of the gap that stays
     pub unexplained: f64,
     /// share of the gap that any function of the state could explain, by cross-validation between

@@ -73,7 +73,7 @@ impl Data<'_> {
     /// Coulomb columns with the sign averaged as the torque is.
     pub(super) fn coulomb(&mut self) {
         for (j, c) in self.dry_parameters() {
-            let column = self.dry(j, |_, v| sign(v, T.reversals.sharp * self.speed[j]));
+            let column = self.dry_sign(j, self.lead);
             self.w[j].write(c).copy_from_slice(&column);
         }
     }
@@ -84,8 +84,14 @@ impl Data<'_> {
         self.led(j, self.lead, f)
     }
 
-    /// The same with a velocity `q̇ + T q̈` of another `lead` `T`.
-    pub(super) fn led(&self, j: usize, lead: f64, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    /// Sign of the velocity that the dry friction of actuator `j` feels with a `lead`.
+    pub(super) fn dry_sign(&self, j: usize, lead: f64) -> Vec<f64> {
+        let sharp = T.reversals.sharp * self.speed[j];
+        self.led(j, lead, |_, v| sign(v, sharp))
+    }
+
+    /// As [`Data::dry`] with a velocity `q̇ + T q̈` of another `lead` `T`.
+    fn led(&self, j: usize, lead: f64, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         if lead == 0.0 {
             return self.own(j, f);
         }
@@ -142,9 +148,8 @@ impl Data<'_> {
 
     /// What the sign of the dry friction of actuator `j` changes between two leads.
     fn change_of_sign(&self, j: usize, from: f64, to: f64) -> impl Iterator<Item = f64> {
-        let sharp = T.reversals.sharp * self.speed[j];
-        let of = |lead: f64| self.led(j, lead, |_, v| sign(v, sharp));
-        of(to).into_iter().zip(of(from)).map(|(a, b)| a - b)
+        let pairs = (self.dry_sign(j, to).into_iter()).zip(self.dry_sign(j, from));
+        pairs.map(|(a, b)| a - b)
     }
 
     /// Takes dry friction to reverse `lead` seconds before the velocity does.
@@ -162,13 +167,14 @@ impl Data<'_> {
         }
         self.lead = lead;
         self.coulomb();
-        let mut slots = (0..self.parameters.len()).filter(|c| self.parameters[*c].name == REVERSAL);
-        let slots: Vec<usize> = slots.by_ref().collect();
-        let rounded = (0..self.joints())
-            .filter(|j| stated[*j] != 0.0)
-            .flat_map(|j| self.rounded(j).map(|column| (j, column)));
-        for ((j, column), c) in rounded.collect::<Vec<_>>().into_iter().zip(slots) {
-            self.w[j].write(c).copy_from_slice(&column);
+        let slots: Vec<usize> = (0..self.parameters.len())
+            .filter(|c| self.parameters[*c].name == REVERSAL)
+            .collect();
+        let dry = (0..self.joints()).filter(|j| stated[*j] != 0.0);
+        for (j, slots) in dry.zip(slots.chunks(T.reversals.rounded.len())) {
+            for (c, column) in slots.iter().zip(self.rounded(j)) {
+                self.w[j].write(*c).copy_from_slice(&column);
+            }
         }
     }
 
@@ -199,7 +205,7 @@ impl Data<'_> {
                 doubt * b + open * c
             };
             let mut doubts: Vec<f64> = away.iter().zip(v).map(of).collect();
-            if let Some(Some(filter)) = r.filters.get(j) {
+            if let Some(filter) = r.filter(j) {
                 // an error of one sign about a reversal, as the filter of a coarse encoder leaves it
                 let roots: Vec<f64> = doubts.iter().map(|d| d.sqrt()).collect();
                 let left = filter.pass(&roots);

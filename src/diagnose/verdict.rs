@@ -55,6 +55,8 @@ pub struct Decision {
     pub surprise: [f64; 2],
     /// share of the gap that stays
     pub unexplained: f64,
+    /// whether the refit leaves more on a joint than a sound model does
+    pub stands_out: bool,
 }
 
 impl Decision {
@@ -110,7 +112,8 @@ pub fn decide(
     let surprising = surprise > T.hidden.surprise + T.hidden.per_parameter * st.freedoms;
     // a set that cannot be told apart explains as well as its one right member
     let claimed = members.iter().any(claims);
-    let verdict = match (stands_out(&st, &before) || surprising, claimed) {
+    let shows = stands_out(&st, &before);
+    let verdict = match (shows || surprising, claimed) {
         (false, false) => Verdict::NoGap,
         (_, false) => Verdict::Unknown,
         _ if stands_out(&st, &after) && unexplained > T.gap.unexplained => Verdict::PartlyExplained,
@@ -122,6 +125,7 @@ pub fn decide(
         holdout: [base_held, st.above(&hold_after, false)],
         surprise: [surprise, surprise_after],
         unexplained,
+        stands_out: shows,
     }
 }
 

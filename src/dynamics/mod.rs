@@ -6,7 +6,8 @@
 //! grown to its size; several threads may share one [`Tree`].
 //!
 //! ```
-//! use excite::dynamics::{Samples, Tree, Workspace};
+//! use excite::dynamics::{Samples, Tree};
+//! use excite::dynamics::parts::Workspace;
 //! let robot = excite::Robot::load("planar2")?;
 //! let tree = Tree::new(&robot);
 //! let motion = Samples::from_rows(2, &[[0.3, -0.5]], &[[1.0, 0.2]], &[[0.0, 3.0]]);
@@ -29,7 +30,7 @@ pub use lanes::Isa;
 pub(crate) use parts::Derivatives;
 pub use samples::Samples;
 pub use tree::Tree;
-pub use workspace::Workspace;
+pub(crate) use workspace::Workspace;
 
 use kernel::{Gradients, Scratch, Sink};
 use lanes::Lanes;

@@ -1,5 +1,7 @@
 //! What the types of the [module above](super) are made of, and what their settings choose from.
 
+pub use super::workspace::Workspace;
+
 /// Gradients with respect to positions, velocities and accelerations of every sample.
 #[derive(Debug, Clone, Default)]
 pub struct Derivatives {

@@ -23,6 +23,7 @@ mod format;
 pub(crate) mod isaac_lab;
 #[doc(hidden)]
 pub mod mechanism;
+pub(crate) mod model;
 pub(crate) mod mujoco;
 pub mod parts;
 pub(crate) mod remark;
@@ -37,6 +38,7 @@ pub(crate) mod usd;
 #[doc(hidden)]
 pub use element::{Element, Form};
 pub(crate) use format::{Format, Part};
+pub(crate) use model::Model;
 #[doc(hidden)]
 pub use remark::Remark;
 pub(crate) use scene::Edited;
@@ -47,17 +49,6 @@ use crate::error::{Result, Warning, WarningKind};
 use crate::plant::{Column, Plant};
 use crate::robot::{Inertia, Robot};
 use nalgebra::{Matrix3, Rotation3, SymmetricEigen, Vector3};
-
-/// A model to be written.
-#[derive(Debug, Clone, Copy)]
-pub struct Model<'a> {
-    /// the robot that it is a model of: geometry, loops, the file it was read from
-    pub plant: &'a Plant,
-    /// its bodies and joints with the values to be written
-    pub robot: &'a Robot,
-    /// what the bodies and joints cannot hold
-    pub remarks: &'a [Remark],
-}
 
 /// All formats.
 #[doc(hidden)]
@@ -138,7 +129,8 @@ pub(crate) fn needed(model: &Model) -> Vec<&'static str> {
 ///
 /// ```
 /// use excite::Plant;
-/// use excite::export::{Model, write};
+/// use excite::export::write;
+/// use excite::export::parts::Model;
 ///
 /// let plant = Plant::load("ur5e")?;
 /// let mut robot = plant.robot().clone();

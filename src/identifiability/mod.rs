@@ -19,6 +19,7 @@ mod hardly_moved;
 #[doc(hidden)]
 pub mod json;
 mod load;
+mod numbers;
 #[doc(hidden)]
 pub mod page;
 pub mod parts;
@@ -31,6 +32,7 @@ pub(crate) use elsewhere::TorqueUncertainty;
 #[doc(hidden)]
 pub use load::GAIN;
 pub(crate) use load::LoadAccuracy;
+pub(crate) use numbers::{ConditionNumbers, Prediction};
 pub(crate) use platform::Platform;
 pub(crate) use spread::Spread;
 
@@ -44,38 +46,6 @@ use crate::robot::{Inertia, Robot};
 use crate::trajectory::{Certificate, Proof, Trajectory, sample_period};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Side};
-
-/// The four condition numbers of one trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[non_exhaustive]
-pub struct ConditionNumbers {
-    /// largest over smallest non-zero singular value of the regressor of all standard parameters
-    pub invariant: f64,
-    /// condition number of the columns kept as base parameters
-    pub raw: f64,
-    /// the same with unit columns
-    pub normalised: f64,
-    /// the same with the rows of each joint divided by its torque noise
-    pub weighted: f64,
-}
-
-/// Predicted uncertainty of one base parameter.
-#[derive(Debug, Clone, serde::Serialize)]
-#[non_exhaustive]
-pub struct Prediction {
-    /// name of its kept column
-    pub parameter: String,
-    /// the combination in words
-    pub combination: String,
-    /// unit
-    pub unit: String,
-    /// value in the nominal model
-    pub nominal: f64,
-    /// predicted standard deviation, in that unit
-    pub std: f64,
-    /// predicted relative standard deviation, percent of the nominal value; `None` where that is 0
-    pub percent: Option<f64>,
-}
 
 /// Everything that the report before the run says about one trajectory.
 #[derive(Debug, Clone, serde::Serialize)]

@@ -73,7 +73,8 @@ use normal::Normal;
 /// use excite::Plant;
 /// use excite::identify::{Settings, identify};
 /// use excite::log::parts::Purpose;
-/// use excite::simulate::{Sensors, Settings as Simulation, measure, simulate, to_record};
+/// use excite::simulate::{Settings as Simulation, measure, simulate, to_record};
+/// use excite::simulate::parts::Sensors;
 ///
 /// // a rehearsal: design, simulate, measure
 /// let plant = Plant::load("planar2")?;

@@ -49,7 +49,7 @@ pub(crate) mod system;
 pub mod two_step;
 pub(crate) mod weight;
 
-pub use body::LoadBody;
+pub(crate) use body::LoadBody;
 pub(crate) use gain::Gains;
 pub use identified::Identified;
 #[doc(hidden)]

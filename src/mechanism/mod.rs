@@ -11,7 +11,7 @@
 //! ```
 //!
 //! (Khalil & Dombre 2002, ch. 8; principle of virtual work.) A new mechanism is one file: its
-//! [`Kinematics`] and the tree it puts together with [`tree::Builder`]; see
+//! [`Kinematics`](parts::Kinematics) and the tree it puts together with [`tree::Builder`]; see
 //! [`gough_stewart`] for an example.
 
 // written with indices, as in the kernels: iterators over arrays of wide packs are not inlined into
@@ -68,7 +68,6 @@ pub use forward::Solution;
 pub(crate) use geometry::Segment;
 #[doc(hidden)]
 pub use geometry::{Cone, Geometry, Path};
-pub use geometry::{Coordinates, Kinematics};
 #[doc(hidden)]
 pub use gradients::TaskDerivatives;
 pub(crate) use gradients::rounded_sign;
@@ -81,11 +80,9 @@ pub(crate) use motion_file::read_joint_motion;
 #[doc(hidden)]
 pub use parameters::Parameters;
 pub(crate) use parameters::{Group, Pattern};
-pub use scalar::Scalar;
 #[doc(hidden)]
 pub use singularity::{SINGULAR, Singularity, Spread};
-pub use source::Setup;
-pub(crate) use source::Source;
+pub(crate) use source::{Setup, Source};
 #[doc(hidden)]
 pub use task::PlatformMotion;
 pub(crate) use task::Task;

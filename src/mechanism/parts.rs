@@ -2,10 +2,10 @@
 
 pub use super::certificate::MechanismCertificate;
 pub use super::closed_form::ClosedForm;
-pub use super::geometry::Segment;
+pub use super::geometry::{Coordinates, Kinematics, Segment};
 pub use super::motion::MechanismWorkspace;
 pub use super::parameters::{Group, Pattern};
-pub use super::scalar::Pack;
-pub use super::source::Source;
+pub use super::scalar::{Pack, Scalar};
+pub use super::source::{Setup, Source};
 pub use super::task::Task;
 pub use super::tree::{Builder, Place};

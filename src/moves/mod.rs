@@ -34,12 +34,14 @@ mod planner;
 mod profile;
 mod rehearsal;
 mod rest;
+mod state;
 mod tool;
 
 pub(crate) use guard::Least;
 pub(crate) use load::TorquePeak;
 pub(crate) use peaks::JointPeaks;
 pub use rehearsal::{Rehearsal, rehearse};
+pub(crate) use state::State;
 pub(crate) use tool::ToolPeak;
 
 use crate::collision::clearance::Path;
@@ -49,50 +51,6 @@ use crate::plant::Plant;
 use crate::trajectory::Fourier;
 use crate::trajectory::samples::{Samples, times};
 use leg::Leg;
-
-/// Position, velocity and acceleration of all coordinates.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct State {
-    /// positions, rad or m
-    pub q: Vec<f64>,
-    /// velocities
-    pub qd: Vec<f64>,
-    /// accelerations
-    pub qdd: Vec<f64>,
-}
-
-impl State {
-    /// At rest in a posture.
-    pub fn rest(q: &[f64]) -> Self {
-        State {
-            q: q.to_vec(),
-            qd: vec![0.0; q.len()],
-            qdd: vec![0.0; q.len()],
-        }
-    }
-
-    /// Where a trajectory starts, and passes at every period's end. Rates that vanish but for rounding
-    /// count as zero.
-    pub fn start_of(trajectory: &Fourier) -> Self {
-        let mut state = State::rest(&vec![0.0; trajectory.dof()]);
-        trajectory.evaluate(0.0, [&mut state.q, &mut state.qd, &mut state.qdd]);
-        let omega = std::f64::consts::TAU / trajectory.period;
-        for (k, series) in trajectory.joints.iter().enumerate() {
-            for (rate, order) in [(&mut state.qd[k], 1), (&mut state.qdd[k], 2)] {
-                let size = series.amplitude_sum(&trajectory.harmonics, omega, order);
-                if rate.abs() <= 1e-9 * size {
-                    *rate = 0.0;
-                }
-            }
-        }
-        state
-    }
-
-    /// Whether nothing moves.
-    pub fn is_rest(&self) -> bool {
-        self.qd.iter().chain(&self.qdd).all(|x| *x == 0.0)
-    }
-}
 
 /// How to move.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -163,7 +121,8 @@ impl Move {
     ///
     /// ```
     /// use excite::Plant;
-    /// use excite::moves::{Move, Settings, State};
+    /// use excite::moves::{Move, Settings};
+    /// use excite::moves::parts::State;
     ///
     /// let plant = Plant::load("planar2")?;
     /// let (from, to) = (State::rest(&[0.0, 0.5]), State::rest(&[0.4, -0.5]));

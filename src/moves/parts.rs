@@ -4,4 +4,5 @@ pub use super::guard::Least;
 pub use super::load::TorquePeak;
 pub use super::peaks::{JointPeaks, Peaks};
 pub use super::rehearsal::{Load, Speed};
+pub use super::state::State;
 pub use super::tool::ToolPeak;

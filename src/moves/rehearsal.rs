@@ -125,7 +125,8 @@ impl Rehearsal {
 /// ```
 /// use excite::Plant;
 /// use excite::moves::{Rehearsal, rehearse};
-/// use excite::trajectory::{Fourier, Series, Trajectory};
+/// use excite::trajectory::{Fourier, Trajectory};
+/// use excite::trajectory::parts::Series;
 ///
 /// let plant = Plant::load("planar2")?;
 /// let swing = Series { constant: 0.0, sin: vec![0.4], cos: vec![0.0] };

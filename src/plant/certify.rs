@@ -74,7 +74,8 @@ impl Plant {
     ///
     /// ```
     /// use excite::Plant;
-    /// use excite::trajectory::{Fourier, Series};
+    /// use excite::trajectory::Fourier;
+    /// use excite::trajectory::parts::Series;
     ///
     /// let plant = Plant::load("planar2")?;
     /// let swing = Series { constant: 0.0, sin: vec![0.1], cos: vec![0.0] };

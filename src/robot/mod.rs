@@ -26,8 +26,8 @@ pub(crate) mod xacro;
 #[doc(hidden)]
 pub use file::holds_robot;
 pub use inertia::Inertia;
-pub use joint::{Joint, JointTerm, Limits};
-pub(crate) use joint::{Motion, Prior};
+pub use joint::Joint;
+pub(crate) use joint::{JointTerm, Limits, Motion, Prior};
 #[doc(hidden)]
 pub use meant::Placement;
 pub(crate) use parameter::{Column, Parameter};

@@ -1,6 +1,6 @@
 //! What the types of the [module above](super) are made of, and what their settings choose from.
 
-pub use super::joint::{Motion, Prior};
+pub use super::joint::{JointTerm, Limits, Motion, Prior};
 pub use super::parameter::{Column, Parameter};
 pub use super::stribeck::Stribeck;
 pub use super::tool::Tool;

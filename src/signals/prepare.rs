@@ -85,9 +85,8 @@ impl Prepared {
                     return Ok((f64::INFINITY, as_is));
                 }
                 if settings.derivation == Derivation::Wiener && dq.is_none() {
-                    let (s, _, band) =
-                        wiener::differentiated(q, &[0.0], q.len(), None, record.step);
-                    return Ok((band, [s.q, s.qd, s.qdd]));
+                    let d = wiener::differentiated(q, &[0.0], q.len(), None, record.step);
+                    return Ok((d.band, [d.motion.q, d.motion.qd, d.motion.qdd]));
                 }
                 let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
                 let frequency = match settings.position_cutoff {
@@ -217,10 +216,10 @@ impl Prepared {
                 if settings.derivation == Derivation::Wiener {
                     let all = &q[from..from + samples * count];
                     let cycles = Some((samples, samples * (count - 1)));
-                    let (s, _, band) =
-                        wiener::differentiated(all, &[0.0], all.len(), cycles, record.step);
-                    let one = [s.q, s.qd, s.qdd].map(|x| x[..samples].to_vec());
-                    return (if band > 0.0 { band } else { wiener::BAND }, one);
+                    let d = wiener::differentiated(all, &[0.0], all.len(), cycles, record.step);
+                    let x = d.motion;
+                    let one = [x.q, x.qd, x.qdd].map(|x| x[..samples].to_vec());
+                    return (if d.band > 0.0 { d.band } else { wiener::BAND }, one);
                 }
                 let parts: Vec<&[f64]> = (0..count)
                     .map(|p| &q[from + p * samples..from + (p + 1) * samples])

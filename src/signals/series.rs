@@ -6,7 +6,7 @@
 
 use super::grid::{RATE, Source, lattice, repeats, resample, thinned, third_difference};
 use super::repeats::{freedoms, means, repeat, scatter, widen};
-use super::wiener::{BAND, Filter, SMOOTH, differentiated, filters, half_width};
+use super::wiener::{BAND, Differentiated, Filter, SMOOTH, differentiated, half_width};
 use super::{cutoff, standstill};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
@@ -79,6 +79,11 @@ impl Series {
     /// Acceleration of one actuator.
     pub fn acceleration(&self, j: usize) -> &[f64] {
         &self.actuators.qdd[j * self.count..(j + 1) * self.count]
+    }
+
+    /// What the positions of actuator `j` passed, where its encoder is coarse.
+    pub fn filter(&self, j: usize) -> Option<&Filter> {
+        self.filters.get(j)?.as_ref()
     }
 
     /// Number of measured samples.
@@ -281,14 +286,15 @@ impl Series {
             })
             .collect();
         let cycles = cycle.map(|cycle| (cycle, free));
-        let (motion, position_noise, band) = differentiated(&q, &steps, count, cycles, dt);
-        let filters = match cycle {
-            Some(_) => Vec::new(),
-            None => filters(&q, &steps, count, dt),
-        };
+        let Differentiated {
+            motion,
+            noise: position_noise,
+            band,
+            filters,
+        } = differentiated(&q, &steps, count, cycles, dt);
         let reference = reference.map(|columns| {
             let exact = vec![0.0; n];
-            differentiated(&columns, &exact, count, cycles, dt).0
+            differentiated(&columns, &exact, count, cycles, dt).motion
         });
         let standing = standing(
             plant,

@@ -32,7 +32,7 @@ fn periodic(
     count: usize,
     (cycle, free): (usize, usize),
     dt: f64,
-) -> (Samples, Vec<f64>, f64) {
+) -> Differentiated {
     let n = steps.len();
     let periods = count / cycle;
     let period = cycle as f64 * dt;
@@ -96,14 +96,31 @@ fn periodic(
         .zip(steps)
         .map(|(v, s)| v.max(*s).sqrt())
         .collect();
-    (out, noise, band)
+    Differentiated {
+        motion: out,
+        noise,
+        band,
+        filters: Vec::new(),
+    }
+}
+
+/// A motion limited to a band, and what is known of the positions that it comes from.
+pub struct Differentiated {
+    /// positions, velocities, accelerations
+    pub motion: Samples,
+    /// standard deviation of a position, by row
+    pub noise: Vec<f64>,
+    /// highest frequency with motion in it, Hz; 0 where none stands out
+    pub band: f64,
+    /// what the positions of coarse encoders passed, by row; empty where the motion repeats
+    pub filters: Vec<Option<Filter>>,
 }
 
 /// A signal limited to the band of the positions: the mean period up to [`BAND`] where the motion
 /// repeats, low-passed as they are otherwise.
 pub fn limited(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
     let cycles = cycle.map(|c| (c, c * (x.len() / c - 1)));
-    differentiated(x, &[0.0], x.len(), cycles, dt).0.q
+    differentiated(x, &[0.0], x.len(), cycles, dt).motion.q
 }
 
 /// Positions limited to a band, with their derivatives, noise and band: by Fourier series where the
@@ -115,7 +132,7 @@ pub fn differentiated(
     count: usize,
     cycles: Option<(usize, usize)>,
     dt: f64,
-) -> (Samples, Vec<f64>, f64) {
+) -> Differentiated {
     match cycles {
         Some(cycles) => periodic(q, steps, count, cycles, dt),
         None => smooth(q, steps, count, dt),
@@ -128,26 +145,37 @@ pub fn half_width(dt: f64) -> usize {
 }
 
 /// Low-passed positions and their central differences.
-fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> (Samples, Vec<f64>, f64) {
+fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> Differentiated {
     let n = steps.len();
     let mut out = Samples::zeros(n, count);
     let mut noise = Vec::new();
     let half = half_width(dt);
-    let filters = filters(q, steps, count, dt);
+    let mut filters = Vec::new();
     for j in 0..n {
         let row = &q[j * count..(j + 1) * count];
-        noise.push(variance(row, steps[j]).sqrt());
-        let clean = match &filters[j] {
+        let variance = variance(row, steps[j]);
+        noise.push(variance.sqrt());
+        let filter = match steps[j] > 0.0 {
+            true => Filter::of(row, variance, dt),
+            false => None,
+        };
+        let clean = match &filter {
             Some(filter) => filter.pass(row),
             None => low_pass(row, half),
         };
+        filters.push(filter);
         let velocity = difference(&clean, dt);
         let acceleration = difference(&velocity, dt);
         out.q[j * count..(j + 1) * count].copy_from_slice(&clean);
         out.qd[j * count..(j + 1) * count].copy_from_slice(&velocity);
         out.qdd[j * count..(j + 1) * count].copy_from_slice(&acceleration);
     }
-    (out, noise, SMOOTH)
+    Differentiated {
+        motion: out,
+        noise,
+        band: SMOOTH,
+        filters,
+    }
 }
 
 /// What the positions of a coarse encoder pass: every line of their spectrum `S(f)` weighted by `max(0, 1 − S_n/S(f))`
@@ -254,15 +282,6 @@ fn variance(q: &[f64], steps: f64) -> f64 {
         .sum::<f64>()
         / (20.0 * q.len() as f64);
     rough.max(steps)
-}
-
-/// What the positions of every actuator pass where the motion does not repeat and its encoder is coarse.
-pub fn filters(q: &[f64], steps: &[f64], count: usize, dt: f64) -> Vec<Option<Filter>> {
-    let of = |(row, steps): (&[f64], &f64)| match *steps > 0.0 {
-        true => Filter::of(row, variance(row, *steps), dt),
-        false => None,
-    };
-    q.chunks_exact(count).zip(steps).map(of).collect()
 }
 
 fn difference(x: &[f64], dt: f64) -> Vec<f64> {

@@ -15,7 +15,8 @@
 //! ```
 //! use excite::plant::Plant;
 //! use excite::simulate::{Settings, simulate};
-//! use excite::trajectory::{Fourier, Series};
+//! use excite::trajectory::Fourier;
+//! use excite::trajectory::parts::Series;
 //!
 //! let plant = Plant::load("planar2")?;
 //! let series = |a: f64| Series { constant: 0.0, sin: vec![a], cos: vec![0.1] };
@@ -43,7 +44,7 @@ mod simulator;
 #[doc(hidden)]
 pub use dynamics::{Dynamics, Terms};
 pub use effects::Effects;
-pub use record::{Sensors, measure, to_record};
+pub use record::{measure, to_record};
 pub use run::Run;
 pub use settings::Settings;
 
@@ -69,7 +70,8 @@ const REPORT: usize = 256;
 /// ```
 /// use excite::Plant;
 /// use excite::simulate::{Settings, simulate};
-/// use excite::trajectory::{Fourier, Series};
+/// use excite::trajectory::Fourier;
+/// use excite::trajectory::parts::Series;
 ///
 /// let plant = Plant::load("planar2")?;
 /// let swing = Series { constant: 0.0, sin: vec![0.1], cos: vec![0.0] };

@@ -2,4 +2,4 @@
 
 pub use super::control::Controller;
 pub use super::effects::Field;
-pub use super::record::Measured;
+pub use super::record::{Measured, Sensors};

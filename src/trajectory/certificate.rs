@@ -349,7 +349,8 @@ impl Certificate {
 ///
 /// ```
 /// use excite::Robot;
-/// use excite::trajectory::{Fourier, Series, certify};
+/// use excite::trajectory::{Fourier, certify};
+/// use excite::trajectory::parts::Series;
 ///
 /// let robot = Robot::load("planar2")?;
 /// // 0.1 sin(2π t / 5 s) for both joints

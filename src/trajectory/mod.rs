@@ -42,8 +42,9 @@ pub use extrema::{Extrema, Extremum, extrema};
 pub use extrema_fast::extrema_fast;
 pub(crate) use file::Space;
 pub use file::Trajectory;
+pub use fourier::Fourier;
+pub(crate) use fourier::Series;
 pub(crate) use fourier::evaluate_series;
-pub use fourier::{Fourier, Series};
 #[doc(hidden)]
 pub use fourier::{RATE, sample_period};
 pub(crate) use grid::Grid;

@@ -13,8 +13,9 @@ pub mod shared;
 pub mod tripod;
 
 use excite::dynamics::Samples;
+use excite::robot::parts::Limits;
 use excite::robot::parts::{Motion, Prior};
-use excite::robot::{Body, Inertia, Joint, Limits, Robot};
+use excite::robot::{Body, Inertia, Joint, Robot};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -43,9 +44,6 @@ pub fn inertia(r: &mut impl Rng) -> Inertia {
 
 pub fn joint(name: &str, motion: Motion) -> Joint {
     Joint {
-        name: name.into(),
-        motion,
-        continuous: false,
         limits: Limits {
             position: [-2.5, 2.5],
             velocity: 2.0,
@@ -55,14 +53,7 @@ pub fn joint(name: &str, motion: Motion) -> Joint {
             ..Limits::default()
         },
         torque_noise: Some(0.1),
-        position_resolution: None,
-        gear_ratio: None,
-        piston: None,
-        continuous_torque: None,
-        continuous_power: None,
-        terms: [0.0; 4],
-        stribeck: Default::default(),
-        identify: [false; 4],
+        ..Joint::new(name, motion)
     }
 }
 

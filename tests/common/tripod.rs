@@ -2,12 +2,14 @@
 //! platform that translates (a linear Delta). With four rails it is redundantly actuated.
 
 use excite::Result;
+use excite::mechanism::Mechanism;
 use excite::mechanism::parts::{ClosedForm, Group, Pattern, Segment, Source, Task};
+use excite::mechanism::parts::{Coordinates, Kinematics, Setup};
 use excite::mechanism::scalar::Scalar;
 use excite::mechanism::tree::{Builder, Place};
-use excite::mechanism::{Coordinates, Kinematics, Mechanism, Setup};
+use excite::robot::Joint;
+use excite::robot::parts::JointTerm;
 use excite::robot::parts::Motion;
-use excite::robot::{Joint, JointTerm};
 use nalgebra::{Matrix3, Vector3};
 
 #[derive(Debug, Clone)]

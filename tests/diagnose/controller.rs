@@ -15,7 +15,8 @@ use excite::robot::parts::Prior;
 use excite::simulate::parts::Controller;
 use excite::simulate::record::{Sensors, measure};
 use excite::simulate::{Effects, Settings as Simulation, simulate};
-use excite::trajectory::{Fourier, Series};
+use excite::trajectory::Fourier;
+use excite::trajectory::parts::Series;
 use std::f64::consts::TAU;
 
 const RATE: f64 = 250.0;

@@ -13,8 +13,10 @@ use excite::log::parts::{Payload, Purpose};
 use excite::log::{Channels, Experiment, Record};
 use excite::plant::Plant;
 use excite::regressor::nominal_torque;
-use excite::robot::{Inertia, JointTerm};
-use excite::trajectory::{Fourier, Series};
+use excite::robot::Inertia;
+use excite::robot::parts::JointTerm;
+use excite::trajectory::Fourier;
+use excite::trajectory::parts::Series;
 use rand::Rng;
 
 const RATE: f64 = 200.0;

@@ -3,12 +3,13 @@
 use crate::common::shared::shared;
 use excite::diagnose::parts::Verdict;
 use excite::diagnose::{Diagnosis, Settings, json, of_logs, page};
-use excite::export::{Model, write};
+use excite::export::parts::Model;
+use excite::export::write;
 use excite::identify;
 use excite::load;
 use excite::log::{Experiment, Record};
 use excite::plant::Plant;
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::robot::parts::Prior;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

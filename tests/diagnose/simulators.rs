@@ -4,7 +4,8 @@
 
 use super::common::python;
 use excite::diagnose::{Settings, diagnose};
-use excite::export::{self, Model};
+use excite::export;
+use excite::export::parts::Model;
 use excite::log::Experiment;
 use rayon::prelude::*;
 use std::path::Path;

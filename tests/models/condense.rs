@@ -10,8 +10,9 @@ use excite::identify::{
 };
 use excite::log::parts::Purpose;
 use excite::log::{Experiment, Outline, Record};
-use excite::robot::JointTerm;
-use excite::simulate::{Effects, Sensors, measure, simulate, to_record};
+use excite::robot::parts::JointTerm;
+use excite::simulate::parts::Sensors;
+use excite::simulate::{Effects, measure, simulate, to_record};
 use std::ops::ControlFlow;
 use std::path::Path;
 

@@ -12,7 +12,7 @@ use excite::identify::parts::{Consistency, Method};
 use excite::identify::{Identification, Settings, identify};
 use excite::log::parts::{Payload, Purpose};
 use excite::log::{Experiment, Record};
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::{Plant, Robot};
 use rand::Rng;
 use std::f64::consts::PI;

@@ -2,7 +2,8 @@
 //! the controller's own formula at 10 kHz, with its figures written here.
 
 use excite::design::{Design, Settings, design};
-use excite::moves::{Move, Settings as MoveSettings, State, rehearse};
+use excite::moves::parts::State;
+use excite::moves::{Move, Settings as MoveSettings, rehearse};
 use excite::robot::Robot;
 use excite::robot::parts::VelocityByPosition;
 use excite::trajectory::Fourier;

@@ -2,12 +2,14 @@
 
 mod certificate;
 
+use excite::robot::parts::Limits;
 use excite::robot::parts::{Motion, Prior};
-use excite::robot::{Body, Inertia, Joint, Limits, Robot};
+use excite::robot::{Body, Inertia, Joint, Robot};
 use excite::trajectory::certificate::Kind;
 use excite::trajectory::jets::{Jet, Norms};
+use excite::trajectory::parts::Series;
 use excite::trajectory::parts::{Ends, Grid};
-use excite::trajectory::{Basis, Fourier, Series, certify, torque_certificate};
+use excite::trajectory::{Basis, Fourier, certify, torque_certificate};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -15,19 +17,8 @@ use rand_chacha::ChaCha8Rng;
 
 fn joint(name: &str, motion: Motion, limits: Limits) -> Joint {
     Joint {
-        name: name.into(),
-        motion,
-        continuous: false,
         limits,
-        torque_noise: None,
-        position_resolution: None,
-        gear_ratio: None,
-        piston: None,
-        continuous_torque: None,
-        continuous_power: None,
-        terms: [0.0; 4],
-        stribeck: Default::default(),
-        identify: [false; 4],
+        ..Joint::new(name, motion)
     }
 }
 

@@ -6,8 +6,9 @@ use excite::identifiability::assess;
 use excite::identifiability::parts::Answer;
 use excite::mechanism::{Mechanism, bundled};
 use excite::regressor::term_factor;
-use excite::robot::JointTerm;
-use excite::trajectory::{Fourier, Series, Trajectory, sample_period};
+use excite::robot::parts::JointTerm;
+use excite::trajectory::parts::Series;
+use excite::trajectory::{Fourier, Trajectory, sample_period};
 use faer::Mat;
 use faer::linalg::solvers::DenseSolveCore;
 

@@ -11,7 +11,7 @@ use excite::design::{Design, Settings, design};
 use excite::dynamics::Samples;
 use excite::identifiability::assess;
 use excite::mechanism::Mechanism;
-use excite::robot::{JointTerm, Limits};
+use excite::robot::parts::{JointTerm, Limits};
 use excite::trajectory::parts::{Ends, Space};
 use excite::trajectory::{Basis, Fourier, Trajectory, certify};
 use rand::Rng;

@@ -5,13 +5,15 @@ mod singular;
 
 use crate::common;
 use crate::common::parallel::{delta, h4, hexapod, reference, states};
-use excite::dynamics::{Isa, Samples, Workspace};
+use excite::dynamics::parts::Workspace;
+use excite::dynamics::{Isa, Samples};
 use excite::mechanism::gough_stewart::{Bodies, GoughStewart};
 use excite::mechanism::h4::{H4, Model};
 use excite::mechanism::parallelogram::motor_frame;
 use excite::mechanism::parts::MechanismWorkspace;
 use excite::mechanism::{Mechanism, MechanismMotion, TaskDerivatives};
-use excite::robot::{Body, JointTerm};
+use excite::robot::Body;
+use excite::robot::parts::JointTerm;
 use nalgebra::{Matrix3, Vector3};
 use rand::Rng;
 

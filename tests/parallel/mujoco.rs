@@ -4,7 +4,8 @@
 use super::common::python;
 use super::loops::pairs;
 use excite::Plant;
-use excite::export::{Model, write};
+use excite::export::parts::Model;
+use excite::export::write;
 use excite::mechanism::Mechanism;
 use std::process::Command;
 

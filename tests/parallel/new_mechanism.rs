@@ -12,11 +12,13 @@ use excite::mechanism::loops::{Closure, Coincide, Frame, Loops};
 use excite::mechanism::parts::{
     ClosedForm, Group, MechanismWorkspace, Pattern, Segment, Source, Task,
 };
+use excite::mechanism::parts::{Coordinates, Kinematics, Setup};
 use excite::mechanism::scalar::{Pack, Scalar};
 use excite::mechanism::tree::{Builder, Place};
-use excite::mechanism::{Coordinates, Kinematics, Mechanism, Setup, TaskDerivatives};
+use excite::mechanism::{Mechanism, TaskDerivatives};
 use excite::robot::parts::Motion;
-use excite::robot::{Inertia, Joint, JointTerm, Limits};
+use excite::robot::parts::{JointTerm, Limits};
+use excite::robot::{Inertia, Joint};
 use excite::{Plant, Result};
 use nalgebra::{Matrix3, Vector3};
 

@@ -13,7 +13,7 @@ use excite::mechanism::h4::Model;
 use excite::mechanism::parallelogram;
 use excite::mechanism::parts::Task;
 use excite::mechanism::{Mechanism, PlatformMotion};
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use nalgebra::DMatrix;
 use rand::Rng;
 use serde_json::Value;

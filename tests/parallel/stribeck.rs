@@ -5,12 +5,15 @@ use excite::Plant;
 use excite::design::design;
 use excite::design::parts::Question;
 use excite::dynamics::Samples;
-use excite::export::{Model, write};
+use excite::export::parts::Model;
+use excite::export::write;
 use excite::identify::{Identification, identify};
 use excite::log::parts::Purpose;
 use excite::mechanism::{Mechanism, bundled};
-use excite::simulate::{Sensors, Settings, measure, simulate, to_record};
-use excite::trajectory::{Fourier, Series};
+use excite::simulate::parts::Sensors;
+use excite::simulate::{Settings, measure, simulate, to_record};
+use excite::trajectory::Fourier;
+use excite::trajectory::parts::Series;
 
 const LINES: &str = "stribeck = 12.0\nstribeck_velocity = 0.03\n";
 

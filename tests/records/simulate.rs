@@ -8,7 +8,8 @@ use excite::simulate::monte_carlo::monte_carlo;
 use excite::simulate::parts::{Controller, Field};
 use excite::simulate::record::{Columns, Sensors, measure, write_log};
 use excite::simulate::{Dynamics, Effects, Run, Settings, simulate};
-use excite::trajectory::{Fourier, Series, Trajectory};
+use excite::trajectory::parts::Series;
+use excite::trajectory::{Fourier, Trajectory};
 use nalgebra::DVector;
 use std::process::Command;
 

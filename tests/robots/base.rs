@@ -5,7 +5,8 @@ use crate::common;
 use excite::base::parts::Identifiability;
 use excite::base::{BaseParameters, random_states};
 use excite::regressor::Regressor;
-use excite::robot::{JointTerm, Robot};
+use excite::robot::Robot;
+use excite::robot::parts::JointTerm;
 use rand::Rng;
 
 const FRICTION: [JointTerm; 3] = [JointTerm::Armature, JointTerm::Viscous, JointTerm::Coulomb];

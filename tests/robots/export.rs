@@ -3,7 +3,8 @@
 
 use super::common::python;
 use excite::Plant;
-use excite::export::{Model, Remark, write};
+use excite::export::parts::Model;
+use excite::export::{Remark, write};
 use excite::robot::Robot;
 use std::path::Path;
 use std::process::Command;

@@ -3,7 +3,7 @@
 mod toml;
 mod urdf;
 
-use excite::robot::JointTerm;
+use excite::robot::parts::JointTerm;
 use excite::robot::parts::Prior;
 use excite::{Error, Robot};
 use proptest::prelude::*;

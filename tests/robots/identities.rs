@@ -4,7 +4,8 @@
 use crate::common;
 
 use excite::dynamics::parts::Derivatives;
-use excite::dynamics::{Isa, Samples, Tree, Workspace};
+use excite::dynamics::parts::Workspace;
+use excite::dynamics::{Isa, Samples, Tree};
 use excite::robot::Robot;
 use nalgebra::Vector3;
 use rand::Rng;

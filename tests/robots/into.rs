@@ -3,8 +3,10 @@
 
 use super::common::python;
 use excite::Plant;
-use excite::export::{Element, Model, Remark, into_scene, write};
-use excite::robot::{Inertia, JointTerm, Robot};
+use excite::export::parts::Model;
+use excite::export::{Element, Remark, into_scene, write};
+use excite::robot::parts::JointTerm;
+use excite::robot::{Inertia, Robot};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use std::path::Path;
 use std::process::Command;

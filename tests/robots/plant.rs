@@ -8,14 +8,15 @@ use excite::Plant;
 use excite::design::{Settings, design};
 use excite::robot::Robot;
 use excite::robot::parts::Column;
+use excite::trajectory::Fourier;
+use excite::trajectory::parts::Series;
 use excite::trajectory::parts::{Proof, Space};
-use excite::trajectory::{Fourier, Series};
 
 fn plants() -> Vec<Plant> {
     let (model, _) = parallel::reference("sg");
     let (h4, _) = parallel::reference("h4");
     let mut hexapod = parallel::hexapod(&model);
-    hexapod.identify = vec![excite::robot::JointTerm::Viscous];
+    hexapod.identify = vec![excite::robot::parts::JointTerm::Viscous];
     for leg in &mut hexapod.legs {
         leg.terms = [0.4, 30.0, 12.0, 1.0];
     }

@@ -5,10 +5,12 @@
 use crate::common::compare::largest;
 use excite::Robot;
 use excite::base::BaseParameters;
-use excite::dynamics::{Isa, Samples, Tree, Workspace};
+use excite::dynamics::parts::Workspace;
+use excite::dynamics::{Isa, Samples, Tree};
 use excite::identifiability::condition_numbers;
 use excite::regressor::Regressor;
-use excite::trajectory::{Fourier, Series, sample_period};
+use excite::trajectory::parts::Series;
+use excite::trajectory::{Fourier, sample_period};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::Path;

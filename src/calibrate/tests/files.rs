@@ -35,17 +35,8 @@ fn a_calibrated_file_is_read_back_with_the_calibrated_geometry() {
 #[test]
 fn mistaken_files_are_said_to_be_what_they_are() {
     let opened = open("ur5e", None).unwrap();
-    let good = made(
-        &opened,
-        Kind::Pose,
-        [3e-4, 3.5e-4],
-        [0.001, 0.002],
-        [30, 5],
-        10,
-        0,
-    );
-    let change = |f: &dyn Fn(&mut Row)| {
-        let mut c = made(
+    let poses = || {
+        made(
             &opened,
             Kind::Pose,
             [3e-4, 3.5e-4],
@@ -53,7 +44,11 @@ fn mistaken_files_are_said_to_be_what_they_are() {
             [30, 5],
             10,
             0,
-        );
+        )
+    };
+    let good = poses();
+    let change = |f: &dyn Fn(&mut Row)| {
+        let mut c = poses();
         c.rows.iter_mut().for_each(f);
         calibrate(&c, &opened, Settings::default())
             .map(|_| ())
@@ -103,15 +98,7 @@ fn mistaken_files_are_said_to_be_what_they_are() {
     let said = change(&|r| r.q.swap(1, 2));
     assert!(said.contains("no geometry near"), "{said}");
     let first = good.rows[0].q.clone();
-    let mut same = made(
-        &opened,
-        Kind::Pose,
-        [3e-4, 3.5e-4],
-        [0.001, 0.002],
-        [30, 5],
-        10,
-        0,
-    );
+    let mut same = poses();
     same.rows.iter_mut().for_each(|r| r.q.clone_from(&first));
     let said = calibrate(&same, &opened, Settings::default())
         .map(|_| ())

@@ -5,8 +5,7 @@ use super::estimate::{Place, Quantity};
 use super::leg_geometry::Deformations;
 use crate::diagnose::column::Column;
 use crate::diagnose::data::Data;
-use crate::diagnose::thresholds::THRESHOLDS as T;
-use crate::diagnose::window::{averaged, sign};
+use crate::diagnose::window::averaged;
 use crate::dynamics::Samples;
 use crate::mechanism::MechanismMotion;
 use crate::plant;
@@ -171,8 +170,7 @@ impl<'a> Context<'a> {
 
     /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
     pub fn sign(&self, j: usize) -> Vec<f64> {
-        let width = T.reversals.sharp * self.data.speed[j];
-        self.data.dry(j, |_, v| sign(v, width))
+        self.data.dry_sign(j, self.data.lead)
     }
 
     /// Change of the rigid-body torque of all actuators when coordinate `j` moves by a small `δ`

@@ -136,12 +136,11 @@ impl State<'_> {
         };
         let seen = (over(without) - over(with)) / over(without).max(1e-9);
         let explains = (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9);
-        let allowed = |j: &usize| without[*j] / self.allowance[*j];
-        let all: Vec<usize> = (0..without.len()).collect();
+        let allowed = |j: usize| without[j] / self.allowance[j];
         // a coarse encoder leaves something on any joint
         let coarse = self.allowance.iter().any(|a| *a > 1.0);
-        let counted = if coarse { &joints } else { &all };
-        let there = counted.iter().map(allowed).fold(0.0, f64::max) / rows;
+        let counted = (0..without.len()).filter(|j| !coarse || joints.contains(j));
+        let there = counted.map(allowed).fold(0.0, f64::max) / rows;
         let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
         let ringing = match self.effects[c.effect].rings(&c.shape) {
             true => T.matters.ringing.above(own),

@@ -239,9 +239,10 @@ fn the_layout_of_example_parallel_robots_is_read() {
 /// Other values written to a robot file and its URDF are the values that are read from them.
 #[test]
 fn an_identified_tree_with_loops_is_written_and_read() {
+    use excite::export::mechanism;
     use excite::export::parts::Format;
+    use excite::export::parts::Model;
     use excite::export::urdf::Urdf;
-    use excite::export::{Model, mechanism};
     use excite::plant::Plant;
     let frames = "lock = { pin = 0.0 }\nactuated = [\"motor_left\", \"motor_right\"]\n\
                   [[joint]]\nname = \"motor_left\"\nidentify = [\"armature\", \"coulomb\", \"offset\"]\n\

@@ -3,8 +3,9 @@
 use super::{Folder, altered, designed, motion};
 use excite::controller::{AIM, Course, Interpolation, Leg};
 use excite::moves::{Move, Settings};
+use excite::trajectory::parts::Series;
 use excite::trajectory::samples::times;
-use excite::trajectory::{Fourier, Samples, Series, Trajectory};
+use excite::trajectory::{Fourier, Samples, Trajectory};
 use excite::{Plant, Robot};
 use rand::Rng;
 
