@@ -13,6 +13,8 @@ import os, signal, sys, threading, time, warnings
 import numpy as np
 import excite
 
+# a shell starts what runs in the background with Ctrl-C ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 warnings.simplefilter("ignore")
 name = sys.argv[1]
 robot = excite.Robot.load("planar2")

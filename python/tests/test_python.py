@@ -167,6 +167,8 @@ def test_progress(robot, plan):
 
 INTERRUPTED = """
 import excite, os, signal, threading, time, warnings
+# a shell starts what runs in the background with Ctrl-C ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 warnings.simplefilter("ignore")
 told = threading.Event()
 def look(done, of, words):
@@ -208,7 +210,8 @@ def test_ctrl_c_ends_the_program(tmp_path):
         pytest.skip("signals of another kind")
     run = subprocess.Popen(
         [sys.executable, "-m", "excite", "design", "planar2", "--time-limit", "60", "--output", str(tmp_path / "out")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     time.sleep(3)
     run.send_signal(signal.SIGINT)
     out, err = run.communicate(timeout=30)

@@ -159,10 +159,13 @@ fn summary(name: &str, m: &Move) -> String {
     if let Some((torque, used)) = strongest {
         let _ = write!(
             out,
-            "; largest torque {} at {:.1} % (sampled)",
+            "; largest torque {} at {:.1} %",
             torque.joint,
             100.0 * used
         );
+        if let Some((bound, limit)) = torque.bound.zip(torque.limit) {
+            let _ = write!(out, ", never above {:.1} %", 100.0 * bound / limit);
+        }
     }
     out.push('\n');
     let _ = match &m.clearance {

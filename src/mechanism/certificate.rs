@@ -27,7 +27,8 @@
 
 use super::margins::PoseKind;
 use super::motion::slice;
-use super::reach::{actuator_reach, missing, sampled_reach};
+use super::reach::{actuator_reach, sampled_reach};
+use super::smooth::Smooth;
 use super::{Mechanism, MechanismWorkspace};
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -85,6 +86,16 @@ pub struct PosePeak {
     pub satisfied: bool,
 }
 
+impl PosePeak {
+    /// Share of the limit that the bound uses; 1 at the limit.
+    pub(crate) fn bound_used(&self) -> f64 {
+        match self.kind {
+            PoseKind::PassiveJoint => self.bound / self.limit,
+            _ => self.limit / self.bound.max(1e-12),
+        }
+    }
+}
+
 impl Mechanism {
     /// Judges a motion of the task coordinates against the workspace box and all limits of the
     /// actuators times `derate` (positions keep the middle of their range), and against passive joints,
@@ -104,12 +115,39 @@ fn judge(mechanism: &Mechanism, fourier: &Fourier, derate: f64) -> Result<Mechan
         joint.limits = joint.limits.derated(derate);
     }
     let samples = fourier.motion(SAMPLES);
-    let platform = platform_certificate(mechanism, fourier, &samples)?;
+    let smooth = Smooth::Period(fourier.period / samples.count as f64);
+    let platform = platform_certificate(mechanism, fourier, &samples, &smooth)?;
     let (kinematic, proof) = actuator_certificates(mechanism, fourier, &actuators, &samples)?;
+    let forces = forces(mechanism, &actuators, &samples, &smooth)?;
+    let joints = kinematic.into_iter().zip(forces);
+    let joints = joints.map(|(own, force)| JointCertificate {
+        torque: Some(force),
+        ..own
+    });
+    let actuators = Certificate::new(joints.collect());
+    let poses = mechanism.platform_motion(&samples)?;
+    let pose = pose_peaks(mechanism.platform(), &poses, &smooth, derate);
+    let satisfied = platform.satisfied && actuators.satisfied && pose.iter().all(|p| p.satisfied);
+    Ok(MechanismCertificate {
+        platform,
+        actuators,
+        pose,
+        proof,
+        satisfied,
+    })
+}
+
+/// Forces of the actuators at the samples, with the stated bound between them.
+pub(super) fn forces(
+    mechanism: &Mechanism,
+    actuators: &Robot,
+    samples: &Samples,
+    smooth: &Smooth,
+) -> Result<Vec<TorqueBound>> {
     let mut ws = MechanismWorkspace::default();
     let n = samples.count;
     let na = mechanism.actuators();
-    let (mut smooth, mut friction) = (vec![0.0; na * n], vec![0.0; na * n]);
+    let (mut rest, mut friction) = (vec![0.0; na * n], vec![0.0; na * n]);
     let (mut part, mut force) = (Samples::default(), Vec::new());
     for (from, to) in mechanism.chunks(n) {
         slice(&samples, from, to, &mut part);
@@ -118,18 +156,15 @@ fn judge(mechanism: &Mechanism, fourier: &Fourier, derate: f64) -> Result<Mechan
         mechanism.smooth_force(&mut ws, &mut force);
         for a in 0..na {
             let rows = a * n + from..a * n + to;
-            smooth[rows.clone()].copy_from_slice(&force[a * count..(a + 1) * count]);
+            rest[rows.clone()].copy_from_slice(&force[a * count..(a + 1) * count]);
             let at = (na + a) * count;
             friction[rows].copy_from_slice(&force[at..at + count]);
         }
     }
-    let step = fourier.period / n as f64;
-    let joints = actuators
-        .joints
-        .iter()
-        .enumerate()
+    let each = actuators.joints.iter().enumerate();
+    Ok(each
         .map(|(a, joint)| {
-            let tau = &smooth[a * n..(a + 1) * n];
+            let tau = &rest[a * n..(a + 1) * n];
             let coulomb = friction[a * n..(a + 1) * n]
                 .iter()
                 .copied()
@@ -143,33 +178,19 @@ fn judge(mechanism: &Mechanism, fourier: &Fourier, derate: f64) -> Result<Mechan
             let limit = joint.limits.effort;
             let limit = limit.is_finite().then_some(limit);
             let value = most + coulomb;
-            JointCertificate {
-                torque: Some(TorqueBound {
-                    joint: joint.name.clone(),
-                    max_on_grid: most,
-                    time: at as f64 * step,
-                    between_grid_bound: missing(tau),
-                    coulomb,
-                    samples: n,
-                    limit,
-                    used: limit.map(|l| value / l),
-                    margin: limit.map(|l| l - value),
-                }),
-                ..kinematic[a].clone()
+            TorqueBound {
+                joint: joint.name.clone(),
+                max_on_grid: most,
+                time: smooth.time(at),
+                between_grid_bound: smooth.missing(tau),
+                coulomb,
+                samples: n,
+                limit,
+                used: limit.map(|l| value / l),
+                margin: limit.map(|l| l - value),
             }
         })
-        .collect();
-    let actuators = Certificate::new(joints);
-    let poses = mechanism.platform_motion(&samples)?;
-    let pose = pose_peaks(mechanism.platform(), &poses, step, derate);
-    let satisfied = platform.satisfied && actuators.satisfied && pose.iter().all(|p| p.satisfied);
-    Ok(MechanismCertificate {
-        platform,
-        actuators,
-        pose,
-        proof,
-        satisfied,
-    })
+        .collect())
 }
 
 /// The workspace box. Exact where the series are those of the platform (or of the joints that the
@@ -178,11 +199,12 @@ fn platform_certificate(
     mechanism: &Mechanism,
     fourier: &Fourier,
     samples: &Samples,
+    smooth: &Smooth,
 ) -> Result<Certificate> {
     if mechanism.follows().is_none() {
         return certify(&mechanism.task_robot(), fourier);
     }
-    let reach = sampled_reach(&*mechanism.platform_motion(samples)?, fourier.period);
+    let reach = sampled_reach(&*mechanism.platform_motion(samples)?, smooth);
     let joints = mechanism.platform().task_robot().joints;
     let all = reach.iter().zip(&joints);
     Ok(Certificate::new(
@@ -230,7 +252,12 @@ fn actuator_certificates(
 }
 
 /// Passive joints, singularities and distances at the samples, with the stated bound between them.
-fn pose_peaks(mechanism: &Mechanism, samples: &Samples, step: f64, derate: f64) -> Vec<PosePeak> {
+pub(super) fn pose_peaks(
+    mechanism: &Mechanism,
+    samples: &Samples,
+    smooth: &Smooth,
+    derate: f64,
+) -> Vec<PosePeak> {
     let pairs = mechanism.pairs();
     let n = samples.count;
     let mut x = vec![0.0; samples.dof];
@@ -267,7 +294,7 @@ fn pose_peaks(mechanism: &Mechanism, samples: &Samples, step: f64, derate: f64) 
                 }
             }
             let value = sign * worst;
-            let bound = value + sign * missing(&values);
+            let bound = value + sign * smooth.missing(&values);
             let limit = match u.kind {
                 PoseKind::PassiveJoint => u.limit * derate,
                 _ => u.limit / derate,
@@ -280,7 +307,7 @@ fn pose_peaks(mechanism: &Mechanism, samples: &Samples, step: f64, derate: f64) 
                 name: u.name,
                 kind: u.kind,
                 value,
-                time: at as f64 * step,
+                time: smooth.time(at),
                 bound,
                 limit,
                 used: used(value),

@@ -48,13 +48,15 @@ mod motion_file;
 pub mod parallelogram;
 pub(crate) mod parameters;
 pub mod parts;
-mod reach;
+pub(crate) mod reach;
 mod regressor;
 #[doc(hidden)]
 pub mod scalar;
 mod singularity;
+pub(crate) mod smooth;
 mod source;
 mod states;
+pub(crate) mod stretches;
 pub(crate) mod task;
 mod torque;
 #[doc(hidden)]

@@ -4,6 +4,7 @@
 use super::Mechanism;
 use super::geometry::Path;
 use super::interval::{Interval, Series};
+use super::smooth::Smooth;
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::robot::{Limits, Robot};
@@ -18,7 +19,7 @@ const MISSING: f64 = 1e-3;
 
 /// Largest of the orders 0 (both signs) to 3 of an actuator so far: at a point of time, and bound.
 #[derive(Clone, Copy)]
-pub(super) struct Reach {
+pub(crate) struct Reach {
     low: Extremum,
     high: Extremum,
     bounds: [f64; 2],
@@ -27,6 +28,34 @@ pub(super) struct Reach {
 }
 
 impl Reach {
+    /// The larger of both.
+    pub fn or(mut self, other: &Reach) -> Self {
+        if other.low.value < self.low.value {
+            self.low = other.low;
+        }
+        if other.high.value > self.high.value {
+            self.high = other.high;
+        }
+        self.bounds[0] = self.bounds[0].min(other.bounds[0]);
+        self.bounds[1] = self.bounds[1].max(other.bounds[1]);
+        for k in 0..3 {
+            if other.peak[k].value > self.peak[k].value {
+                self.peak[k] = other.peak[k];
+            }
+            self.bound[k] = self.bound[k].max(other.bound[k]);
+        }
+        self
+    }
+
+    /// The same, begun so many seconds later.
+    pub fn later(mut self, seconds: f64) -> Self {
+        let peaks = self.peak.iter_mut();
+        for at in peaks.chain([&mut self.low, &mut self.high]) {
+            at.time += seconds;
+        }
+        self
+    }
+
     /// Against limits, without a torque.
     pub fn certificate(&self, joint: &str, limits: &Limits) -> JointCertificate {
         let peak = |k: usize, limit: f64| Peak::new(self.peak[k], self.bound[k], limit);
@@ -59,38 +88,29 @@ impl Default for Reach {
 /// Factorials of the Taylor coefficients.
 const FACTORIAL: [f64; 5] = [1.0, 1.0, 2.0, 6.0, 24.0];
 
+/// Middle and radius of a task coordinate and of its first four derivatives over `c ± r`.
+pub(crate) type Enclosure = [[f64; 2]; 5];
+
 /// Evaluates stretches of time.
 struct Prover<'a> {
     mechanism: &'a Mechanism,
-    fourier: &'a Fourier,
-    /// `Σ_h (hω)ᵏ A_h` of each coordinate, `k = 0 … 6`
-    sums: Vec<[f64; 7]>,
+    /// the task coordinates over `c ± r`
+    task: &'a dyn Fn(f64, f64) -> Vec<Enclosure>,
     /// middle and half of the position limits, and limits of velocity, acceleration and jerk
     limits: Vec<([f64; 2], [f64; 3])>,
     reach: Vec<Reach>,
 }
 
 impl Prover<'_> {
-    /// Enclosures of the task coordinates over `c ± r`, Taylor coefficients.
+    /// Taylor coefficients of the task coordinates over `c ± r`.
     fn task(&self, c: f64, r: f64) -> Vec<Path> {
-        let m = self.fourier.dof();
-        let mut d = vec![0.0; 6 * m];
-        let mut rows = d.chunks_exact_mut(m);
-        let mut row = || rows.next().unwrap_or_default();
-        self.fourier
-            .evaluate(c, [row(), row(), row(), row(), row(), row()]);
-        (0..m)
-            .map(|j| {
-                let sums = &self.sums[j];
-                Series(std::array::from_fn(|k| {
-                    let here = d[k * m + j];
-                    // evaluation is right to rounding of its amplitudes
-                    let rounding = 1e-13 * (sums[k] + here.abs());
-                    let radius = r * d[(k + 1) * m + j].abs() + 0.5 * r * r * sums[k + 2];
-                    Interval::around(here, radius + rounding) * (1.0 / FACTORIAL[k])
-                }))
-            })
-            .collect()
+        let each = (self.task)(c, r).into_iter();
+        each.map(|d| {
+            Series(std::array::from_fn(|k| {
+                Interval::around(d[k][0], d[k][1]) * (1.0 / FACTORIAL[k])
+            }))
+        })
+        .collect()
     }
 
     /// Takes the stretch `c ± r` into account; `None` without closed form.
@@ -132,9 +152,8 @@ impl Prover<'_> {
             self.stretch(c - 0.5 * r, 0.5 * r, depth + 1)?;
             return self.stretch(c + 0.5 * r, 0.5 * r, depth + 1);
         }
-        let time = c.rem_euclid(self.fourier.period);
         for (reach, (value, radius)) in self.reach.iter_mut().zip(found) {
-            let at = |value: f64| Extremum { time, value };
+            let at = |value: f64| Extremum { time: c, value };
             if value[0] < reach.low.value {
                 reach.low = at(value[0]);
             }
@@ -163,14 +182,6 @@ impl Prover<'_> {
     }
 }
 
-/// Largest second difference of a cyclic sequence, doubled, over 8: what may be missing between
-/// two samples.
-pub(super) fn missing(u: &[f64]) -> f64 {
-    let n = u.len();
-    let bend = |s: usize| (u[(s + 1) % n] - 2.0 * u[s] + u[(s + n - 1) % n]).abs();
-    (0..n).map(bend).fold(0.0, f64::max) / 4.0
-}
-
 /// What the actuators reach: proven where the kinematics has a closed form, else sampled with the
 /// stated bound.
 pub(super) fn actuator_reach(
@@ -183,6 +194,47 @@ pub(super) fn actuator_reach(
     let sums = fourier.joints.iter().map(|s| {
         std::array::from_fn(|k| s.amplitude_sum(&fourier.harmonics, omega, k as u32) * (1.0 + 1e-9))
     });
+    // Σ_h (hω)ᵏ A_h of each coordinate, k = 0 … 6
+    let sums: Vec<[f64; 7]> = sums.collect();
+    let m = fourier.dof();
+    let task = |c: f64, r: f64| {
+        let mut d = vec![0.0; 6 * m];
+        let mut rows = d.chunks_exact_mut(m);
+        let mut row = || rows.next().unwrap_or_default();
+        fourier.evaluate(c, [row(), row(), row(), row(), row(), row()]);
+        let one = |j: usize| -> Enclosure {
+            let sums = &sums[j];
+            std::array::from_fn(|k| {
+                let here = d[k * m + j];
+                // evaluation is right to rounding of its amplitudes
+                let rounding = 1e-13 * (sums[k] + here.abs());
+                let radius = r * d[(k + 1) * m + j].abs() + 0.5 * r * r * sums[k + 2];
+                [here, radius + rounding]
+            })
+        };
+        (0..m).map(one).collect()
+    };
+    let count = (40 * fourier.harmonic_max() as usize).clamp(STRETCHES, 20_000);
+    let r = 0.5 * fourier.period / count as f64;
+    let stretches = (0..count).map(|i| ((2 * i + 1) as f64 * r, r));
+    if let Some(reach) = proven(mechanism, &task, actuators, stretches) {
+        return Ok((reach, true));
+    }
+    let motion = mechanism.motion(samples)?.tree;
+    let smooth = Smooth::Period(fourier.period / samples.count as f64);
+    Ok((
+        sampled_reach(&motion.rows(&mechanism.actuated), &smooth),
+        false,
+    ))
+}
+
+/// What the actuators reach over stretches of time `c ± r`, proven; `None` where the kinematics has no closed form.
+pub(super) fn proven(
+    mechanism: &Mechanism,
+    task: &dyn Fn(f64, f64) -> Vec<Enclosure>,
+    actuators: &Robot,
+    mut stretches: impl Iterator<Item = (f64, f64)>,
+) -> Option<Vec<Reach>> {
     let limits = actuators.joints.iter().map(|joint| {
         let l = &joint.limits;
         let [low, high] = l.position;
@@ -193,30 +245,17 @@ pub(super) fn actuator_reach(
     });
     let mut prover = Prover {
         mechanism,
-        fourier,
-        sums: sums.collect(),
+        task,
         limits: limits.collect(),
         reach: vec![Reach::default(); mechanism.actuators()],
     };
-    let count = (40 * fourier.harmonic_max() as usize).clamp(STRETCHES, 20_000);
-    let r = 0.5 * fourier.period / count as f64;
-    let proven = (0..count)
-        .try_for_each(|i| prover.stretch((2 * i + 1) as f64 * r, r, 0))
-        .is_some();
-    if proven {
-        return Ok((prover.reach, true));
-    }
-    let motion = mechanism.motion(samples)?.tree;
-    Ok((
-        sampled_reach(&motion.rows(&mechanism.actuated), fourier.period),
-        false,
-    ))
+    stretches.try_for_each(|(c, r)| prover.stretch(c, r, 0))?;
+    Some(prover.reach)
 }
 
-/// What the rows of a cyclic motion reach at the samples, with the stated bound between them.
-pub(super) fn sampled_reach(motion: &Samples, period: f64) -> Vec<Reach> {
+/// What the rows of a motion reach at the samples, with the stated bound between them.
+pub(super) fn sampled_reach(motion: &Samples, smooth: &Smooth) -> Vec<Reach> {
     let n = motion.count;
-    let step = period / n as f64;
     (0..motion.dof)
         .map(|j| {
             let rows = j * n..(j + 1) * n;
@@ -225,9 +264,7 @@ pub(super) fn sampled_reach(motion: &Samples, period: f64) -> Vec<Reach> {
                 &motion.qd[rows.clone()],
                 &motion.qdd[rows],
             );
-            let jerk: Vec<f64> = (0..n)
-                .map(|s| (qdd[(s + 1) % n] - qdd[(s + n - 1) % n]) / (2.0 * step))
-                .collect();
+            let jerk = smooth.rates(qdd);
             let mut reach = Reach::default();
             let extremum = |u: &[f64], sign: f64| {
                 let mut best = Extremum {
@@ -237,7 +274,7 @@ pub(super) fn sampled_reach(motion: &Samples, period: f64) -> Vec<Reach> {
                 for (s, v) in u.iter().enumerate() {
                     if sign * v > best.value {
                         best = Extremum {
-                            time: s as f64 * step,
+                            time: smooth.time(s),
                             value: sign * v,
                         };
                     }
@@ -250,11 +287,14 @@ pub(super) fn sampled_reach(motion: &Samples, period: f64) -> Vec<Reach> {
                 ..low
             };
             reach.high = extremum(q, 1.0);
-            reach.bounds = [reach.low.value - missing(q), reach.high.value + missing(q)];
+            reach.bounds = [
+                reach.low.value - smooth.missing(q),
+                reach.high.value + smooth.missing(q),
+            ];
             for (k, u) in [qd, qdd, &jerk].into_iter().enumerate() {
                 let (a, b) = (extremum(u, 1.0), extremum(u, -1.0));
                 reach.peak[k] = if a.value > b.value { a } else { b };
-                reach.bound[k] = reach.peak[k].value + missing(u);
+                reach.bound[k] = reach.peak[k].value + smooth.missing(u);
             }
             reach
         })

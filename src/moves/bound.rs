@@ -38,6 +38,15 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// Of nothing that moves.
+    pub fn none(actuators: usize) -> Self {
+        Bounds {
+            torque: vec![0.0; actuators],
+            rate: vec![0.0; actuators],
+            tool: [0.0; 2],
+        }
+    }
+
     /// The larger of both, quantity by quantity.
     pub fn or(mut self, other: &Bounds) -> Self {
         let larger = |a: &mut [f64], b: &[f64]| {
@@ -62,15 +71,12 @@ struct Sample {
     tool: [f64; 2],
 }
 
-/// Bounds of a leg of a serial or tree robot; `None` for closed chains. Intervals are halved until the bounds
+/// Bounds of a leg of a serial or tree robot. Intervals are halved until the bounds
 /// exceed neither a limit nor the largest value by more than 1 % of it, or until the samples are spent.
 ///
 /// # Errors
 /// Those of the torques.
-pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Option<Bounds>> {
-    if plant.mechanism().is_some() {
-        return Ok(None);
-    }
+pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Bounds> {
     let (robot, joints) = (plant.robot(), plant.actuators());
     let norms = Norms::new(robot);
     let tool = robot.tool.as_ref();
@@ -84,11 +90,7 @@ pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Option<Bounds>> {
         let h = b.t - a.t;
         let jets: Vec<Jet> = leg.profiles.iter().map(|p| p.jet(a.t, b.t)).collect();
         let curved = norms.torque_derivatives(&jets);
-        let mut low = Bounds {
-            torque: vec![0.0; n],
-            rate: vec![0.0; n],
-            tool: [0.0; 2],
-        };
+        let mut low = Bounds::none(n);
         let mut high = low.clone();
         for (j, joint) in joints.iter().enumerate() {
             let [from, to] = leg.profiles[j].velocities(a.t, b.t);
@@ -114,12 +116,8 @@ pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Option<Bounds>> {
         (low, high)
     };
 
-    let mut times: Vec<f64> = leg.profiles.iter().flat_map(|p| p.breaks()).collect();
-    times.extend((0..=INTERVALS as usize).map(|k| leg.duration * k as f64 / INTERVALS));
-    times.retain(|t| (0.0..=leg.duration).contains(t));
-    times.sort_by(f64::total_cmp);
-    // what lies closer is rounding
-    times.dedup_by(|b, a| *b - *a < 1e-12 * leg.duration);
+    let even = (0..=INTERVALS as usize).map(|k| leg.duration * k as f64 / INTERVALS);
+    let times = leg.instants(even.collect());
     let first = sample(plant, leg, &times)?;
     let mut taken = first.len();
     let mut open: Vec<[Sample; 2]> = first
@@ -127,13 +125,7 @@ pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Option<Bounds>> {
         .map(|w| [w[0].clone(), w[1].clone()])
         .collect();
     let mut best = vec![0.0_f64; 2 * n + 2];
-    let mut settled: Option<Bounds> = None;
-    let settle = |settled: &mut Option<Bounds>, own: Bounds| {
-        *settled = Some(match settled.take() {
-            Some(all) => all.or(&own),
-            None => own,
-        });
-    };
+    let mut settled = Bounds::none(n);
     while !open.is_empty() {
         let each: Vec<(Bounds, Bounds)> = open.iter().map(|[a, b]| over(a, b)).collect();
         for (low, _) in &each {
@@ -155,7 +147,7 @@ pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Option<Bounds>> {
             let wide = pair[1].t - pair[0].t > 1e-7 * leg.duration;
             match loose && wide && taken + halved.len() < MOST {
                 true => halved.push(pair),
-                false => settle(&mut settled, high),
+                false => settled = settled.or(&high),
             }
         }
         let middles: Vec<f64> = halved.iter().map(|[a, b]| 0.5 * (a.t + b.t)).collect();

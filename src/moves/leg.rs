@@ -31,6 +31,16 @@ impl Leg {
         }
     }
 
+    /// Instants at which a jerk may jump, ends included, with others, in order.
+    pub fn instants(&self, mut others: Vec<f64>) -> Vec<f64> {
+        others.extend(self.profiles.iter().flat_map(|p| p.breaks()));
+        others.retain(|t| (0.0..=self.duration).contains(t));
+        others.sort_by(f64::total_cmp);
+        // what lies closer is rounding
+        others.dedup_by(|b, a| *b - *a < 1e-12 * self.duration);
+        others
+    }
+
     /// The same positions, `factor` times as slow.
     pub fn stretched(&self, factor: f64) -> Self {
         Leg {

@@ -1,7 +1,8 @@
-//! What a leg asks of the actuators, sampled: torques and their rates, the speed of the tool point, and of closed chains the motion of the actuators
-//! and the limits of the pose.
+//! What a leg asks of the actuators, sampled and then bounded: torques and their rates, the speed of the tool point, and of closed chains the
+//! motion of the actuators and the limits of the pose.
 
 use super::bound::{Bounds, bounds};
+use super::closed;
 use super::leg::Leg;
 use super::tool::ToolPeak;
 use crate::dynamics::Samples;
@@ -16,7 +17,8 @@ const FEWEST: usize = 100;
 const MOST: usize = 4000;
 /// Factor at which a leg counts as standing.
 const SLOWEST: f64 = 1e6;
-/// Times that a slowed leg is slowed by another hundredth, where its own samples ask for it.
+/// Factor to which slowness is found, and times that a slowed leg is slowed by it again, where its own samples ask for it.
+const CLOSE: f64 = 1.01;
 const AGAIN: usize = 30;
 /// Share of a limit that counts as kept.
 const KEPT: f64 = 1.0 + 1e-6;
@@ -37,14 +39,14 @@ pub struct TorquePeak {
     pub rate: Option<f64>,
     /// share of the limit of the rate
     pub rate_used: Option<f64>,
-    /// the torque exceeds this at no time; `None` where it is only sampled or has no limit
+    /// the torque exceeds this at no time (proven for serial and tree robots, stated for parallel ones); `None` without a limit
     pub bound: Option<f64>,
-    /// the rate exceeds this at no time; `None` where it is only sampled or has no limit
+    /// the rate exceeds this at no time; `None` without a limit
     pub rate_bound: Option<f64>,
 }
 
 /// The limit that is used most.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Most {
     /// share; 1 at the limit
     pub used: f64,
@@ -53,7 +55,7 @@ pub struct Most {
 }
 
 impl Most {
-    fn offer(&mut self, used: f64, what: impl FnOnce() -> String) {
+    pub fn offer(&mut self, used: f64, what: impl FnOnce() -> String) {
         // what is not a number is beyond every limit
         if used > self.used || used.is_nan() {
             self.used = if used.is_nan() { f64::INFINITY } else { used };
@@ -137,10 +139,7 @@ pub(super) fn largest_rates(
 /// The limit that samples use most, `share` of the actuators' limits of velocity, acceleration and jerk
 /// being allowed.
 fn most(plant: &Plant, x: &Samples, step: f64, share: f64) -> Result<Most> {
-    let mut out = Most {
-        used: 0.0,
-        what: String::new(),
-    };
+    let mut out = Most::default();
     let joints = plant.actuators();
     let mut peaks = vec![0.0; joints.len()];
     let mut rates = peaks.clone();
@@ -207,37 +206,48 @@ fn most(plant: &Plant, x: &Samples, step: f64, share: f64) -> Result<Most> {
 /// Otherwise the limit that no slowness keeps, because the postures alone exceed it. A leg that may not
 /// be slowed (its ends move) is taken as it is or not at all.
 pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
-    let mut leg = match sampled(plant, leg)? {
+    let leg = match sampled(plant, leg)? {
         Ok(leg) => leg,
         Err(most) => return Ok(Err(most)),
     };
-    // a hundredth at a time, then faster: near a limit at rest the bounds shrink slowly
-    let mut factor = 1.01;
-    for tried in 0.. {
-        let Some(found) = bounds(plant, &leg)? else {
-            break;
-        };
-        let most = bounded(plant, &found);
+    let used = |leg: &Leg| -> Result<Most> {
+        Ok(match plant.mechanism() {
+            None => bounded(plant, &bounds(plant, leg)?),
+            Some(m) => closed::most(m, &closed::reached(m, leg)?, share(leg)),
+        })
+    };
+    let first = used(&leg)?;
+    if first.kept() {
+        return Ok(Ok(leg));
+    }
+    if !leg.resting {
+        return Ok(Err(first));
+    }
+    // a hundredth mostly is enough
+    let (mut low, mut high) = (1.0, CLOSE);
+    loop {
+        let most = used(&leg.stretched(high))?;
         if most.kept() {
             break;
         }
-        if !leg.resting || leg.slowed > SLOWEST {
+        if high > SLOWEST {
             return Ok(Err(most));
         }
-        if tried >= AGAIN {
-            factor = 2.0;
-        }
-        leg = leg.stretched(factor);
+        (low, high) = (high, 1.0 + 2.0 * (high - 1.0));
     }
-    Ok(Ok(leg))
+    while high > CLOSE * low {
+        let middle = 0.5 * (low + high);
+        match used(&leg.stretched(middle))?.kept() {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    Ok(Ok(leg.stretched(high)))
 }
 
 /// The limit that bounds use most.
 fn bounded(plant: &Plant, found: &Bounds) -> Most {
-    let mut out = Most {
-        used: 0.0,
-        what: String::new(),
-    };
+    let mut out = Most::default();
     let each = plant
         .actuators()
         .into_iter()
@@ -269,22 +279,24 @@ fn bounded(plant: &Plant, found: &Bounds) -> Most {
     out
 }
 
-/// What all legs exceed at no time; `None` where that is only sampled.
-pub fn all_bounds(plant: &Plant, legs: &[Leg]) -> Result<Option<Bounds>> {
-    let mut out: Option<Bounds> = None;
-    for leg in legs {
-        let own = bounds(plant, leg)?;
-        out = match (out, own) {
-            (Some(all), Some(own)) => Some(all.or(&own)),
-            (all, own) => all.or(own),
-        };
+/// What all legs of a serial or tree robot exceed at no time.
+pub fn all_bounds(plant: &Plant, legs: &[Leg]) -> Result<Bounds> {
+    let none = Bounds::none(plant.actuators().len());
+    let mut each = legs.iter().map(|leg| bounds(plant, leg));
+    each.try_fold(none, |all, own| Ok(all.or(&own?)))
+}
+
+/// Share of the limits of velocity, acceleration and jerk that a leg may use.
+fn share(leg: &Leg) -> f64 {
+    match leg.resting {
+        true => leg.scale,
+        false => 1.0,
     }
-    Ok(out)
 }
 
 fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     let ((x, step), may_slow) = (samples(leg), leg.resting);
-    let share = if may_slow { leg.scale } else { 1.0 };
+    let share = share(leg);
     let slow = |f: f64| most(plant, &slower(&x, f), f * step, share);
     let first = most(plant, &x, step, share)?;
     if first.kept() {
@@ -298,7 +310,7 @@ fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     while high < SLOWEST && !slow(high)?.kept() {
         (low, high) = (high, 2.0 * high);
     }
-    while high > 1.01 * low {
+    while high > CLOSE * low {
         let middle = 0.5 * (low + high);
         match slow(middle)?.kept() {
             true => high = middle,
@@ -312,26 +324,24 @@ fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
         if most(plant, &x, step, share)?.kept() {
             break;
         }
-        slow = slow.stretched(1.01);
+        slow = slow.stretched(CLOSE);
     }
     Ok(Ok(slow))
 }
 
 /// Largest speed and acceleration of the tool point of all legs, and their bounds.
-pub fn tool(plant: &Plant, legs: &[Leg], bounds: Option<&Bounds>) -> Option<ToolPeak> {
+pub fn tool(plant: &Plant, legs: &[Leg], bounds: &Bounds) -> Option<ToolPeak> {
     let each = legs
         .iter()
         .filter_map(|leg| ToolPeak::of(plant, &samples(leg).0));
     let mut most = each.reduce(|a, b| a.or(&b))?;
-    if let Some(Bounds { tool, .. }) = bounds {
-        most.speed_bound = most.speed_used.map(|_| tool[0]);
-        most.acceleration_bound = most.acceleration_used.map(|_| tool[1]);
-    }
+    most.speed_bound = most.speed_used.map(|_| bounds.tool[0]);
+    most.acceleration_bound = most.acceleration_used.map(|_| bounds.tool[1]);
     Some(most)
 }
 
 /// Largest torques of all legs, and their bounds.
-pub fn peaks(plant: &Plant, legs: &[Leg], bounds: Option<&Bounds>) -> Result<Vec<TorquePeak>> {
+pub fn peaks(plant: &Plant, legs: &[Leg], bounds: &Bounds) -> Result<Vec<TorquePeak>> {
     let joints = plant.actuators();
     let mut most = vec![0.0; joints.len()];
     let mut rates = most.clone();
@@ -353,8 +363,8 @@ pub fn peaks(plant: &Plant, legs: &[Leg], bounds: Option<&Bounds>) -> Result<Vec
                 used: limit.map(|l| value / l),
                 rate,
                 rate_used: rate.map(|r| r / fastest),
-                bound: limit.and(bounds).map(|b| b.torque[a]),
-                rate_bound: rate.and(bounds).map(|b| b.rate[a]),
+                bound: limit.map(|_| bounds.torque[a]),
+                rate_bound: rate.map(|_| bounds.rate[a]),
             }
         })
         .collect())

@@ -4,7 +4,7 @@
 //! periodic motion begins. It is jerk-limited, all coordinates leave and arrive together, and each leg
 //! of it is as fast as a stated share of the limits allows. Its positions are piecewise cubics, so that
 //! its extrema are exact. Where the way is not free of collisions, a planner finds postures to go
-//! through. Torques are sampled; where they exceed a limit the leg is slowed down.
+//! through. Torques are bounded for all time; where they exceed a limit the leg is slowed down.
 //!
 //! | file | content |
 //! |---|---|
@@ -17,11 +17,13 @@
 //! | `planner` | a way round what is in the way |
 //! | `plan` | all of it together |
 //! | `bound` | torques, their rates and the tool point between samples |
+//! | `closed` | the same of parallel robots, with the motion of the actuators |
 //! | `load` | torques and their rates along a leg, sampled |
 //! | `tool` | speed of the tool point, sampled |
 //! | `rehearsal` | a motion at several speeds: torques, power, samples, bytes |
 
 mod bound;
+mod closed;
 mod guard;
 mod leg;
 mod limits;
@@ -37,6 +39,7 @@ mod rest;
 mod state;
 mod tool;
 
+pub(crate) use closed::ClosedPeaks;
 pub(crate) use guard::Least;
 pub(crate) use load::TorquePeak;
 pub(crate) use peaks::JointPeaks;
@@ -99,6 +102,8 @@ pub struct Move {
     pub torques: Vec<TorquePeak>,
     /// largest speed and acceleration of the tool point at a sample, and their bounds; `None` without limits
     pub tool: Option<ToolPeak>,
+    /// of a parallel robot: actuators, and limits of the pose
+    pub closed: Option<ClosedPeaks>,
     /// how much slower the slowest leg is for the sake of torques and their rates, of velocities by position and
     /// of the tool point; 1: not slower
     pub slowed: f64,
@@ -117,7 +122,7 @@ pub struct Move {
 impl Move {
     /// The fastest move from one state to another within a share of the limits of velocity,
     /// acceleration and jerk, within the limits of position and torque, and, with a scene, free of
-    /// collisions: for all time, but torques of parallel robots, which are sampled.
+    /// collisions, for all time. Forces and poses of parallel robots have a stated bound between samples.
     ///
     /// ```
     /// use excite::Plant;
@@ -204,6 +209,7 @@ impl Move {
             "joints": self.joints,
             "torques": self.torques,
             "tool": self.tool,
+            "closed": self.closed,
             "clearance": self.clearance,
         })
     }

@@ -1,5 +1,6 @@
 //! What the types of the [module above](super) are made of, and what their settings choose from.
 
+pub use super::closed::ClosedPeaks;
 pub use super::guard::Least;
 pub use super::load::TorquePeak;
 pub use super::peaks::{JointPeaks, Peaks};

@@ -1,5 +1,7 @@
 //! A whole move: the direct leg where it is free, otherwise legs through postures at rest.
 
+use super::bound::Bounds;
+use super::closed;
 use super::guard::{Blocked, Guard, Line};
 use super::leg::Leg;
 use super::limits::{by_position, inside, limits, raised, scaled, still_at};
@@ -364,17 +366,29 @@ impl Planner<'_> {
                 }),
             }
         });
-        let bounds = all_bounds(self.plant, &whole)?;
+        let (bounds, closed) = match self.plant.mechanism() {
+            None => (all_bounds(self.plant, &whole)?, None),
+            Some(m) => {
+                let found = closed::all(m, &whole)?;
+                let force = found.iter().flat_map(|f| &f.forces).map(|f| f.bound());
+                let bounds = Bounds {
+                    torque: force.collect(),
+                    ..Bounds::none(m.actuators())
+                };
+                (bounds, found.map(|f| closed::ClosedPeaks::of(m, f)))
+            }
+        };
         let mut found = Move {
             duration: whole.iter().map(|leg| leg.duration).sum(),
             from: from.clone(),
             to: to.clone(),
             via: via.collect(),
             joints: joints.collect(),
-            torques: peaks(self.plant, &whole, bounds.as_ref())?,
-            tool: tool(self.plant, &whole, bounds.as_ref()),
+            torques: peaks(self.plant, &whole, &bounds)?,
+            tool: tool(self.plant, &whole, &bounds),
             slowed: whole.iter().map(|leg| leg.slowed).fold(1.0, f64::max),
             scale: whole.iter().map(|leg| leg.scale).fold(0.0, f64::max),
+            closed,
             clearance: None,
             tries,
             warnings: Vec::new(),

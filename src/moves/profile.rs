@@ -192,6 +192,28 @@ impl Profile {
         out
     }
 
+    /// Middle and radius of the position and its first four derivatives over `c ± r`, where the jerk is constant.
+    pub fn enclosure(&self, c: f64, r: f64) -> [[f64; 2]; 5] {
+        let Some(p) = self.pieces.get(self.index(c)) else {
+            return [[0.0; 2]; 5];
+        };
+        let s = c - p.start;
+        let ([q, v, a], j) = (p.at(s), p.jerk);
+        let [q0, v0, a0] = p.state.map(f64::abs);
+        // right to rounding of what is added up
+        let rounding = 1e-13;
+        let (fast, bent) = (v0 + s * (a0 + s * j.abs()), a0 + s * j.abs());
+        let place = q0 + s * fast;
+        let (v1, a1) = (v.abs() + 0.5 * r * a.abs(), a.abs() + 0.5 * r * j.abs());
+        [
+            [q, r * (v1 + r * r * j.abs() / 6.0) + rounding * place],
+            [v, r * a1 + rounding * fast],
+            [a, r * j.abs() + rounding * bent],
+            [j, rounding * j.abs()],
+            [0.0; 2],
+        ]
+    }
+
     /// What the share of a velocity by position exceeds at no time: intervals whose bound, the largest
     /// velocity against the one allowed at the outermost position, exceeds the largest share found by more
     /// than [`CLOSE`] are halved. Less than `still` counts as standing.

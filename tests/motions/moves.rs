@@ -1,6 +1,7 @@
 //! Moves against their limits, against another planner, and among walls; the rehearsal table.
 
 mod among;
+mod closed;
 mod rehearsal;
 
 use excite::collision::scene::{Obstacle, Pair, Partner, Scene, Volume, poses};

@@ -1,0 +1,143 @@
+//! What a leg of a parallel robot asks between its samples, stretch by stretch in which every jerk is constant.
+//!
+//! The actuators' motion is proven where the kinematics has a closed form. Forces and the limits of the pose are sampled,
+//! with a stated bound: see [`stretches`](crate::mechanism::stretches).
+
+use super::leg::Leg;
+use super::load::Most;
+use crate::dynamics::Samples;
+use crate::error::Result;
+use crate::mechanism::Mechanism;
+use crate::mechanism::PosePeak;
+use crate::mechanism::smooth::{Smooth, Stretch};
+use crate::mechanism::stretches::Reached;
+use crate::robot::{Joint, Limits};
+use crate::trajectory::certificate::{JointCertificate, Proof};
+
+/// Samples of a leg, at least, and of each stretch of it.
+const SAMPLES: f64 = 2000.0;
+const FEWEST: f64 = 16.0;
+
+/// What a move of a parallel robot exceeds at no time.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct ClosedPeaks {
+    /// the actuators; where they are the coordinates, the platform's box
+    pub joints: Vec<JointCertificate>,
+    /// how these are known between the samples
+    pub proof: Proof,
+    /// passive joints, singularities, distances: sampled, with a stated bound
+    pub pose: Vec<PosePeak>,
+}
+
+impl ClosedPeaks {
+    pub(super) fn of(mechanism: &Mechanism, found: Reached) -> Self {
+        ClosedPeaks {
+            joints: found.certificates(&mechanism.led()),
+            proof: found.proof,
+            pose: found.pose,
+        }
+    }
+}
+
+/// What a leg reaches.
+///
+/// # Errors
+/// A leg that leaves the reach.
+pub fn reached(mechanism: &Mechanism, leg: &Leg) -> Result<Reached> {
+    let times = leg.instants(Vec::new());
+    let total = leg.duration.max(1e-9);
+    let (mut at, mut stretches) = (Vec::new(), Vec::new());
+    for ends in times.windows(2) {
+        let length = ends[1] - ends[0];
+        let count = (SAMPLES * length / total).ceil().max(FEWEST) as usize;
+        let step = length / count as f64;
+        stretches.push(Stretch {
+            samples: at.len()..at.len() + count + 1,
+            start: ends[0],
+            step,
+        });
+        at.extend((0..=count).map(|i| ends[0] + i as f64 * step));
+    }
+    let count = at.len();
+    let mut x = Samples::zeros(leg.profiles.len(), count);
+    for (k, p) in leg.profiles.iter().enumerate() {
+        for (s, t) in at.iter().enumerate() {
+            let at = k * count + s;
+            [x.q[at], x.qd[at], x.qdd[at]] = p.at(*t);
+        }
+    }
+    let task = |c: f64, r: f64| {
+        let profiles = leg.profiles.iter();
+        profiles.map(|p| p.enclosure(c, r)).collect()
+    };
+    mechanism.reached(&x, &Smooth::Stretches(stretches), &task)
+}
+
+/// The limit that a leg uses most, `share` of those of velocity, acceleration and jerk being allowed.
+pub fn most(mechanism: &Mechanism, found: &Reached, share: f64) -> Most {
+    let mut out = Most::default();
+    for force in &found.forces {
+        let (bound, limit) = (force.bound(), force.limit.unwrap_or(f64::INFINITY));
+        out.offer(bound / limit, || {
+            format!("force of {}: up to {bound:.4} of {limit:.4}", force.joint)
+        });
+    }
+    let scaled = |joint: Joint| Joint {
+        limits: Limits {
+            velocity: share * joint.limits.velocity,
+            acceleration: share * joint.limits.acceleration,
+            jerk: share * joint.limits.jerk,
+            ..joint.limits
+        },
+        ..joint
+    };
+    let led: Vec<Joint> = mechanism.led().into_iter().map(scaled).collect();
+    for joint in found.certificates(&led) {
+        let [low, high] = joint.position.bounds;
+        if let (Some(least), Some(largest)) = (joint.position.lower, joint.position.upper) {
+            let (middle, half) = (0.5 * (least + largest), 0.5 * (largest - least));
+            let used = (high - middle).max(middle - low) / half;
+            out.offer(used, || {
+                format!(
+                    "position of {}: up to [{low:.4}, {high:.4}], its limits are [{least}, {largest}]",
+                    joint.joint
+                )
+            });
+        }
+        let rates = [
+            ("velocity", joint.velocity),
+            ("acceleration", joint.acceleration),
+            ("jerk", joint.jerk),
+        ];
+        for (what, peak) in rates {
+            let limit = peak.limit.unwrap_or(f64::INFINITY);
+            out.offer(peak.bound / limit, || {
+                format!(
+                    "{what} of {}: up to {:.4} of {limit:.4}",
+                    joint.joint, peak.bound
+                )
+            });
+        }
+    }
+    for pose in &found.pose {
+        out.offer(pose.bound_used(), || {
+            format!("{}: {:.4} of {:.4}", pose.name, pose.bound, pose.limit)
+        });
+    }
+    out
+}
+
+/// What all legs reach; `None` without legs.
+pub fn all(mechanism: &Mechanism, legs: &[Leg]) -> Result<Option<Reached>> {
+    let (mut out, mut start) = (None::<Reached>, 0.0);
+    for leg in legs {
+        let own = reached(mechanism, leg)?.later(start);
+        out = Some(match out {
+            Some(all) => all.or(own),
+            None => own,
+        });
+        start += leg.duration;
+    }
+    Ok(out)
+}
