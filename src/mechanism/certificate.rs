@@ -150,7 +150,7 @@ pub(super) fn forces(
     let (mut rest, mut friction) = (vec![0.0; na * n], vec![0.0; na * n]);
     let (mut part, mut force) = (Samples::default(), Vec::new());
     for (from, to) in mechanism.chunks(n) {
-        slice(&samples, from, to, &mut part);
+        slice(samples, from, to, &mut part);
         let count = part.count;
         mechanism.evaluate_motion(&mut ws, &part)?;
         mechanism.smooth_force(&mut ws, &mut force);
