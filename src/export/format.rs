@@ -40,9 +40,9 @@ pub trait Format: Sync {
     fn name(&self) -> &'static str;
     /// Name of the file.
     fn file(&self) -> &'static str;
-    /// Whether it can hold robots of this kind.
-    fn holds(&self, _plant: &Plant) -> bool {
-        true
+    /// Whether it can hold robots of this kind: mostly serial and tree robots.
+    fn holds(&self, plant: &Plant) -> bool {
+        !plant.closed()
     }
     /// Whether it has this part of a model.
     fn has(&self, part: Part) -> bool;

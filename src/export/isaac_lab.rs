@@ -26,10 +26,6 @@ impl Format for IsaacLab {
         "actuators.py"
     }
 
-    fn holds(&self, plant: &crate::plant::Plant) -> bool {
-        !plant.closed()
-    }
-
     fn has(&self, part: Part) -> bool {
         matches!(part, Part::Term(term) if term != JointTerm::Offset)
     }

@@ -16,7 +16,6 @@ use super::{
     Format, LEAST, Model, Part, bounded, breakaway, escape, possible, remark, xml_comment,
 };
 use crate::error::Result;
-use crate::plant::Plant;
 use crate::robot::{Body, Inertia, JointTerm, Robot};
 use std::fmt::Write;
 
@@ -40,10 +39,6 @@ impl Format for Mujoco {
 
     fn file(&self) -> &'static str {
         "robot.xml"
-    }
-
-    fn holds(&self, plant: &Plant) -> bool {
-        !plant.closed()
     }
 
     fn has(&self, _part: Part) -> bool {

@@ -17,6 +17,10 @@ impl Format for RobotToml {
         "robot.toml"
     }
 
+    fn holds(&self, _plant: &crate::plant::Plant) -> bool {
+        true
+    }
+
     fn has(&self, _part: Part) -> bool {
         // with the URDF that it refers to
         true

@@ -23,10 +23,6 @@ impl Format for Sdf {
         "robot.sdf"
     }
 
-    fn holds(&self, plant: &crate::plant::Plant) -> bool {
-        !plant.closed()
-    }
-
     fn has(&self, part: Part) -> bool {
         match part {
             Part::Bodies | Part::Frames => true,

@@ -23,6 +23,10 @@ impl Format for Urdf {
         FILE
     }
 
+    fn holds(&self, _plant: &crate::plant::Plant) -> bool {
+        true
+    }
+
     fn has(&self, part: Part) -> bool {
         match part {
             Part::Bodies | Part::Frames => true,

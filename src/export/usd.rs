@@ -22,10 +22,6 @@ impl Format for Usd {
         "robot.usda"
     }
 
-    fn holds(&self, plant: &crate::plant::Plant) -> bool {
-        !plant.closed()
-    }
-
     fn has(&self, part: Part) -> bool {
         match part {
             Part::Bodies | Part::Frames | Part::Gravity => true,

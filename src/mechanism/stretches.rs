@@ -10,7 +10,7 @@ use super::reach::{Enclosure, Reach, proven, sampled_reach};
 use super::smooth::Smooth;
 use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::robot::Joint;
+use crate::robot::{Joint, Limits};
 use crate::trajectory::TorqueBound;
 use crate::trajectory::certificate::{JointCertificate, Proof};
 
@@ -20,13 +20,13 @@ const ENCLOSED: f64 = 400.0;
 /// What a motion reaches, for all time.
 #[derive(Clone)]
 pub(crate) struct Reached {
-    /// the joints of [`Mechanism::led`]
-    pub led: Vec<Reach>,
+    /// what follows from the coordinates: the platform's box where the actuators are the coordinates, otherwise the actuators
+    pub led: Vec<(Joint, Reach)>,
     /// forces of the actuators
     pub forces: Vec<TorqueBound>,
     /// passive joints, singularities, distances
     pub pose: Vec<PosePeak>,
-    /// how the joints of [`Mechanism::led`] are known
+    /// how these joints are known
     pub proof: Proof,
 }
 
@@ -34,7 +34,7 @@ impl Reached {
     /// The larger of both.
     pub fn or(mut self, other: Reached) -> Self {
         let led = self.led.into_iter().zip(&other.led);
-        self.led = led.map(|(a, b)| a.or(b)).collect();
+        self.led = led.map(|((j, a), (_, b))| (j, a.or(b))).collect();
         for (own, new) in self.forces.iter_mut().zip(other.forces) {
             if new.bound() > own.bound() {
                 *own = new;
@@ -51,35 +51,30 @@ impl Reached {
 
     /// The same, begun so many seconds later.
     pub fn later(mut self, seconds: f64) -> Self {
-        self.led = self.led.into_iter().map(|r| r.later(seconds)).collect();
+        let led = self.led.into_iter();
+        self.led = led.map(|(j, r)| (j, r.later(seconds))).collect();
         self.forces.iter_mut().for_each(|f| f.time += seconds);
         self.pose.iter_mut().for_each(|p| p.time += seconds);
         self
     }
 
-    /// The joints of [`Mechanism::led`] against limits.
-    pub fn certificates(&self, led: &[Joint]) -> Vec<JointCertificate> {
-        let each = led.iter().zip(&self.led);
-        each.map(|(joint, reach)| reach.certificate(&joint.name, &joint.limits))
-            .collect()
+    /// The joints that follow, against a share of their limits of velocity, acceleration and jerk.
+    pub fn certificates(&self, share: f64) -> Vec<JointCertificate> {
+        let one = |(joint, reach): &(Joint, Reach)| {
+            let own = joint.limits;
+            let limits = Limits {
+                velocity: share * own.velocity,
+                acceleration: share * own.acceleration,
+                jerk: share * own.jerk,
+                ..own
+            };
+            reach.certificate(&joint.name, &limits)
+        };
+        self.led.iter().map(one).collect()
     }
 }
 
 impl Mechanism {
-    /// What follows from the coordinates and has limits of position and rates: the platform's box where the actuators are
-    /// the coordinates, otherwise the actuators.
-    pub(crate) fn led(&self) -> Vec<Joint> {
-        match (self.follows(), self.task_joints().is_empty()) {
-            (Some(platform), _) => platform.task_robot().joints,
-            (None, true) => self.actuator_robot().joints,
-            (None, false) => {
-                let given = self.task_joints();
-                let free = self.actuated.iter().filter(|a| !given.contains(a));
-                free.map(|&a| self.robot.joints[a].clone()).collect()
-            }
-        }
-    }
-
     /// What a motion reaches: `samples` of it, smooth in `smooth`, with `task` the coordinates over `c ± r`.
     ///
     /// # Errors
@@ -92,34 +87,32 @@ impl Mechanism {
     ) -> Result<Reached> {
         let actuators = self.actuator_robot();
         let poses = self.platform_motion(samples)?;
-        let (led, proof) = match (self.follows(), self.task_joints().is_empty()) {
-            (Some(_), _) => (sampled_reach(&poses, smooth), Proof::Stated),
-            (None, true) => match proven(self, task, &actuators, pieces(smooth).into_iter()) {
+        let sampled = |joints: &[usize]| -> Result<Vec<Reach>> {
+            let tree = self.motion(samples)?.tree;
+            Ok(sampled_reach(&tree.rows(joints), smooth))
+        };
+        let given = self.task_joints();
+        let (joints, reach, proof) = if let Some(platform) = self.follows() {
+            let box_of = platform.task_robot().joints;
+            (box_of, sampled_reach(&poses, smooth), Proof::Stated)
+        } else if given.is_empty() {
+            let proven = proven(self, task, &actuators, pieces(smooth).into_iter());
+            let (reach, proof) = match proven {
                 Some(reach) => (reach, Proof::Enclosed),
-                None => {
-                    let tree = self.motion(samples)?.tree;
-                    (
-                        sampled_reach(&tree.rows(&self.actuated), smooth),
-                        Proof::Stated,
-                    )
-                }
-            },
-            (None, false) => {
-                let given = self.task_joints();
-                let free: Vec<usize> = (self.actuated.iter().copied())
-                    .filter(|a| !given.contains(a))
-                    .collect();
-                match free.is_empty() {
-                    true => (Vec::new(), Proof::Exact),
-                    false => {
-                        let tree = self.motion(samples)?.tree;
-                        (sampled_reach(&tree.rows(&free), smooth), Proof::Stated)
-                    }
-                }
+                None => (sampled(&self.actuated)?, Proof::Stated),
+            };
+            (actuators.joints.clone(), reach, proof)
+        } else {
+            let free = self.actuated.iter().copied();
+            let free: Vec<usize> = free.filter(|a| !given.contains(a)).collect();
+            let joints = free.iter().map(|&a| self.robot.joints[a].clone());
+            match free.is_empty() {
+                true => (Vec::new(), Vec::new(), Proof::Exact),
+                false => (joints.collect(), sampled(&free)?, Proof::Stated),
             }
         };
         Ok(Reached {
-            led,
+            led: joints.into_iter().zip(reach).collect(),
             forces: forces(self, &actuators, samples, smooth)?,
             pose: pose_peaks(self.platform(), &poses, smooth, 1.0),
             proof,

@@ -10,10 +10,12 @@
 //!
 //! The rate of the torque jumps where a jerk does; intervals end there, so both of its limits count.
 
+use super::closed;
 use super::leg::Leg;
 use crate::dynamics::Samples;
 use crate::dynamics::point::{Point, PointMotion};
 use crate::error::Result;
+use crate::mechanism::stretches::Reached;
 use crate::plant::Plant;
 use crate::regressor::term_factor;
 use crate::robot::JointTerm;
@@ -27,7 +29,7 @@ const MOST: usize = 60_000;
 const TARGET: f64 = 0.01;
 
 /// What is exceeded at no time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone)]
 pub struct Bounds {
     /// torque of every actuator, dry friction included
     pub torque: Vec<f64>,
@@ -35,6 +37,8 @@ pub struct Bounds {
     pub rate: Vec<f64>,
     /// speed and acceleration of the tool point
     pub tool: [f64; 2],
+    /// of a closed chain
+    pub closed: Option<Reached>,
 }
 
 impl Bounds {
@@ -44,17 +48,28 @@ impl Bounds {
             torque: vec![0.0; actuators],
             rate: vec![0.0; actuators],
             tool: [0.0; 2],
+            closed: None,
         }
     }
 
     /// The larger of both, quantity by quantity.
-    pub fn or(mut self, other: &Bounds) -> Self {
+    pub fn or(mut self, other: Bounds) -> Self {
         let larger = |a: &mut [f64], b: &[f64]| {
             a.iter_mut().zip(b).for_each(|(a, b)| *a = a.max(*b));
         };
         larger(&mut self.torque, &other.torque);
         larger(&mut self.rate, &other.rate);
         larger(&mut self.tool, &other.tool);
+        self.closed = match (self.closed, other.closed) {
+            (Some(a), Some(b)) => Some(a.or(b)),
+            (a, b) => a.or(b),
+        };
+        self
+    }
+
+    /// The same, begun so many seconds later.
+    pub fn later(mut self, seconds: f64) -> Self {
+        self.closed = self.closed.map(|c| c.later(seconds));
         self
     }
 
@@ -71,12 +86,20 @@ struct Sample {
     tool: [f64; 2],
 }
 
-/// Bounds of a leg of a serial or tree robot. Intervals are halved until the bounds
+/// Bounds of a leg. Of a closed chain: [`closed`](super::closed). Of a serial or tree robot, intervals are halved until the bounds
 /// exceed neither a limit nor the largest value by more than 1 % of it, or until the samples are spent.
 ///
 /// # Errors
 /// Those of the torques.
 pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Bounds> {
+    if let Some(mechanism) = plant.mechanism() {
+        let found = closed::reached(mechanism, leg)?;
+        return Ok(Bounds {
+            torque: found.forces.iter().map(|f| f.bound()).collect(),
+            closed: Some(found),
+            ..Bounds::none(mechanism.actuators())
+        });
+    }
     let (robot, joints) = (plant.robot(), plant.actuators());
     let norms = Norms::new(robot);
     let tool = robot.tool.as_ref();
@@ -147,7 +170,7 @@ pub fn bounds(plant: &Plant, leg: &Leg) -> Result<Bounds> {
             let wide = pair[1].t - pair[0].t > 1e-7 * leg.duration;
             match loose && wide && taken + halved.len() < MOST {
                 true => halved.push(pair),
-                false => settled = settled.or(&high),
+                false => settled = settled.or(high),
             }
         }
         let middles: Vec<f64> = halved.iter().map(|[a, b]| 0.5 * (a.t + b.t)).collect();

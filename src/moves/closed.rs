@@ -11,7 +11,6 @@ use crate::mechanism::Mechanism;
 use crate::mechanism::PosePeak;
 use crate::mechanism::smooth::{Smooth, Stretch};
 use crate::mechanism::stretches::Reached;
-use crate::robot::{Joint, Limits};
 use crate::trajectory::certificate::{JointCertificate, Proof};
 
 /// Samples of a leg, at least, and of each stretch of it.
@@ -30,10 +29,10 @@ pub struct ClosedPeaks {
     pub pose: Vec<PosePeak>,
 }
 
-impl ClosedPeaks {
-    pub(super) fn of(mechanism: &Mechanism, found: Reached) -> Self {
+impl From<Reached> for ClosedPeaks {
+    fn from(found: Reached) -> Self {
         ClosedPeaks {
-            joints: found.certificates(&mechanism.led()),
+            joints: found.certificates(1.0),
             proof: found.proof,
             pose: found.pose,
         }
@@ -74,26 +73,9 @@ pub fn reached(mechanism: &Mechanism, leg: &Leg) -> Result<Reached> {
     mechanism.reached(&x, &Smooth::Stretches(stretches), &task)
 }
 
-/// The limit that a leg uses most, `share` of those of velocity, acceleration and jerk being allowed.
-pub fn most(mechanism: &Mechanism, found: &Reached, share: f64) -> Most {
-    let mut out = Most::default();
-    for force in &found.forces {
-        let (bound, limit) = (force.bound(), force.limit.unwrap_or(f64::INFINITY));
-        out.offer(bound / limit, || {
-            format!("force of {}: up to {bound:.4} of {limit:.4}", force.joint)
-        });
-    }
-    let scaled = |joint: Joint| Joint {
-        limits: Limits {
-            velocity: share * joint.limits.velocity,
-            acceleration: share * joint.limits.acceleration,
-            jerk: share * joint.limits.jerk,
-            ..joint.limits
-        },
-        ..joint
-    };
-    let led: Vec<Joint> = mechanism.led().into_iter().map(scaled).collect();
-    for joint in found.certificates(&led) {
+/// Raises the limit that is used most by what a leg reaches, `share` of those of velocity, acceleration and jerk being allowed.
+pub fn offer(out: &mut Most, found: &Reached, share: f64) {
+    for joint in found.certificates(share) {
         let [low, high] = joint.position.bounds;
         if let (Some(least), Some(largest)) = (joint.position.lower, joint.position.upper) {
             let (middle, half) = (0.5 * (least + largest), 0.5 * (largest - least));
@@ -125,19 +107,4 @@ pub fn most(mechanism: &Mechanism, found: &Reached, share: f64) -> Most {
             format!("{}: {:.4} of {:.4}", pose.name, pose.bound, pose.limit)
         });
     }
-    out
-}
-
-/// What all legs reach; `None` without legs.
-pub fn all(mechanism: &Mechanism, legs: &[Leg]) -> Result<Option<Reached>> {
-    let (mut out, mut start) = (None::<Reached>, 0.0);
-    for leg in legs {
-        let own = reached(mechanism, leg)?.later(start);
-        out = Some(match out {
-            Some(all) => all.or(own),
-            None => own,
-        });
-        start += leg.duration;
-    }
-    Ok(out)
 }

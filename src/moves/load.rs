@@ -136,9 +136,8 @@ pub(super) fn largest_rates(
     each.collect()
 }
 
-/// The limit that samples use most, `share` of the actuators' limits of velocity, acceleration and jerk
-/// being allowed.
-fn most(plant: &Plant, x: &Samples, step: f64, share: f64) -> Result<Most> {
+/// The limit of torques, their rates and the tool point that samples use most.
+fn most(plant: &Plant, x: &Samples, step: f64) -> Result<Most> {
     let mut out = Most::default();
     let joints = plant.actuators();
     let mut peaks = vec![0.0; joints.len()];
@@ -163,42 +162,6 @@ fn most(plant: &Plant, x: &Samples, step: f64, share: f64) -> Result<Most> {
             format!("torque of {}: {peak:.4} of {limit:.4}", joint.name)
         });
     }
-    let Some(mechanism) = plant.mechanism() else {
-        return Ok(out);
-    };
-    let moved = plant.actuator_motion(x)?;
-    for (a, joint) in joints.iter().enumerate() {
-        let l = joint.limits;
-        let [low, high] = l.position;
-        for s in 0..moved.count {
-            let [q, v, w] = moved.at(a, s);
-            if low.is_finite() && high.is_finite() {
-                let used = (q - 0.5 * (low + high)).abs() / (0.5 * (high - low));
-                out.offer(used, || {
-                    format!(
-                        "position of {}: {q:.4}, its limits are [{low}, {high}]",
-                        joint.name
-                    )
-                });
-            }
-            out.offer(v.abs() / (share * l.velocity), || {
-                format!("velocity of {}", joint.name)
-            });
-            out.offer(w.abs() / (share * l.acceleration), || {
-                format!("acceleration of {}", joint.name)
-            });
-        }
-    }
-    let pairs = mechanism.pairs();
-    let x = mechanism.platform_motion(x)?;
-    for s in 0..x.count {
-        let pose: Vec<f64> = (0..x.dof).map(|k| x.q[k * x.count + s]).collect();
-        for u in mechanism.platform().pose_uses(&pose, &pairs) {
-            out.offer(u.used(), || {
-                format!("{}: {:.4} of {:.4}", u.name, u.value, u.limit)
-            });
-        }
-    }
     Ok(out)
 }
 
@@ -210,12 +173,7 @@ pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Mos
         Ok(leg) => leg,
         Err(most) => return Ok(Err(most)),
     };
-    let used = |leg: &Leg| -> Result<Most> {
-        Ok(match plant.mechanism() {
-            None => bounded(plant, &bounds(plant, leg)?),
-            Some(m) => closed::most(m, &closed::reached(m, leg)?, share(leg)),
-        })
-    };
+    let used = |leg: &Leg| Ok(bounded(plant, &bounds(plant, leg)?, share(leg)));
     let first = used(&leg)?;
     if first.kept() {
         return Ok(Ok(leg));
@@ -245,9 +203,12 @@ pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Mos
     Ok(Ok(leg.stretched(high)))
 }
 
-/// The limit that bounds use most.
-fn bounded(plant: &Plant, found: &Bounds) -> Most {
+/// The limit that bounds use most, `share` of those of velocity, acceleration and jerk of a closed chain's joints being allowed.
+fn bounded(plant: &Plant, found: &Bounds, share: f64) -> Most {
     let mut out = Most::default();
+    if let Some(reached) = &found.closed {
+        closed::offer(&mut out, reached, share);
+    }
     let each = plant
         .actuators()
         .into_iter()
@@ -279,11 +240,14 @@ fn bounded(plant: &Plant, found: &Bounds) -> Most {
     out
 }
 
-/// What all legs of a serial or tree robot exceed at no time.
+/// What all legs exceed at no time.
 pub fn all_bounds(plant: &Plant, legs: &[Leg]) -> Result<Bounds> {
-    let none = Bounds::none(plant.actuators().len());
-    let mut each = legs.iter().map(|leg| bounds(plant, leg));
-    each.try_fold(none, |all, own| Ok(all.or(&own?)))
+    let (mut all, mut start) = (Bounds::none(plant.actuators().len()), 0.0);
+    for leg in legs {
+        all = all.or(bounds(plant, leg)?.later(start));
+        start += leg.duration;
+    }
+    Ok(all)
 }
 
 /// Share of the limits of velocity, acceleration and jerk that a leg may use.
@@ -296,9 +260,8 @@ fn share(leg: &Leg) -> f64 {
 
 fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     let ((x, step), may_slow) = (samples(leg), leg.resting);
-    let share = share(leg);
-    let slow = |f: f64| most(plant, &slower(&x, f), f * step, share);
-    let first = most(plant, &x, step, share)?;
+    let slow = |f: f64| most(plant, &slower(&x, f), f * step);
+    let first = most(plant, &x, step)?;
     if first.kept() {
         return Ok(Ok(leg.clone()));
     }
@@ -321,7 +284,7 @@ fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     // its own samples lie elsewhere than those that were slowed
     for _ in 0..AGAIN {
         let (x, step) = samples(&slow);
-        if most(plant, &x, step, share)?.kept() {
+        if most(plant, &x, step)?.kept() {
             break;
         }
         slow = slow.stretched(CLOSE);

@@ -1,7 +1,5 @@
 //! A whole move: the direct leg where it is free, otherwise legs through postures at rest.
 
-use super::bound::Bounds;
-use super::closed;
 use super::guard::{Blocked, Guard, Line};
 use super::leg::Leg;
 use super::limits::{by_position, inside, limits, raised, scaled, still_at};
@@ -366,18 +364,7 @@ impl Planner<'_> {
                 }),
             }
         });
-        let (bounds, closed) = match self.plant.mechanism() {
-            None => (all_bounds(self.plant, &whole)?, None),
-            Some(m) => {
-                let found = closed::all(m, &whole)?;
-                let force = found.iter().flat_map(|f| &f.forces).map(|f| f.bound());
-                let bounds = Bounds {
-                    torque: force.collect(),
-                    ..Bounds::none(m.actuators())
-                };
-                (bounds, found.map(|f| closed::ClosedPeaks::of(m, f)))
-            }
-        };
+        let bounds = all_bounds(self.plant, &whole)?;
         let mut found = Move {
             duration: whole.iter().map(|leg| leg.duration).sum(),
             from: from.clone(),
@@ -388,7 +375,7 @@ impl Planner<'_> {
             tool: tool(self.plant, &whole, &bounds),
             slowed: whole.iter().map(|leg| leg.slowed).fold(1.0, f64::max),
             scale: whole.iter().map(|leg| leg.scale).fold(0.0, f64::max),
-            closed,
+            closed: bounds.closed.map(Into::into),
             clearance: None,
             tries,
             warnings: Vec::new(),

@@ -4,10 +4,9 @@
 //! and take the array module (NumPy, JAX, Torch) as an argument.
 
 use super::element::{Element, FUNCTIONS, Function, Kind, py};
-use super::mujoco::{Mujoco, base_joints, twist_joint};
+use super::mujoco::{base_joints, twist_joint};
 use super::{Form, Format, Model, Part, Remark};
 use crate::error::Result;
-use crate::plant::Plant;
 use crate::robot::{Motion, Robot};
 use serde_json::json;
 use std::fmt::Write;
@@ -28,10 +27,6 @@ impl Format for Effects {
 
     fn file(&self) -> &'static str {
         FUNCTIONS
-    }
-
-    fn holds(&self, plant: &Plant) -> bool {
-        Mujoco.holds(plant)
     }
 
     fn has(&self, _part: Part) -> bool {
