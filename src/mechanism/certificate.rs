@@ -89,10 +89,7 @@ pub struct PosePeak {
 impl PosePeak {
     /// Share of the limit that the bound uses; 1 at the limit.
     pub(crate) fn bound_used(&self) -> f64 {
-        match self.kind {
-            PoseKind::PassiveJoint => self.bound / self.limit,
-            _ => self.limit / self.bound.max(1e-12),
-        }
+        self.kind.used(self.bound, self.limit)
     }
 }
 
@@ -299,10 +296,7 @@ pub(super) fn pose_peaks(
                 PoseKind::PassiveJoint => u.limit * derate,
                 _ => u.limit / derate,
             };
-            let used = |v: f64| match u.kind {
-                PoseKind::PassiveJoint => v / limit,
-                _ => limit / v.max(1e-12),
-            };
+            let used = |v: f64| u.kind.used(v, limit);
             PosePeak {
                 name: u.name,
                 kind: u.kind,

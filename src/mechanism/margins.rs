@@ -49,13 +49,20 @@ pub enum PoseKind {
     Distance,
 }
 
+impl PoseKind {
+    /// Share of a limit that a value uses: 1 at the limit, more beyond.
+    pub(super) fn used(self, value: f64, limit: f64) -> f64 {
+        match self {
+            PoseKind::PassiveJoint => value / limit,
+            _ => limit / value.max(1e-12),
+        }
+    }
+}
+
 impl PoseUse {
     /// 1 at the limit, more beyond.
     pub fn used(&self) -> f64 {
-        match self.kind {
-            PoseKind::PassiveJoint => self.value / self.limit,
-            _ => self.limit / self.value.max(1e-12),
-        }
+        self.kind.used(self.value, self.limit)
     }
 }
 

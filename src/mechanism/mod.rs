@@ -48,7 +48,7 @@ mod motion_file;
 pub mod parallelogram;
 pub(crate) mod parameters;
 pub mod parts;
-pub(crate) mod reach;
+mod reach;
 mod regressor;
 #[doc(hidden)]
 pub mod scalar;

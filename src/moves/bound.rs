@@ -12,7 +12,6 @@
 
 use super::closed;
 use super::leg::Leg;
-use crate::dynamics::Samples;
 use crate::dynamics::point::{Point, PointMotion};
 use crate::error::Result;
 use crate::mechanism::stretches::Reached;
@@ -188,13 +187,7 @@ fn sample(plant: &Plant, leg: &Leg, times: &[f64]) -> Result<Vec<Sample>> {
         return Ok(Vec::new());
     }
     let count = times.len();
-    let mut x = Samples::zeros(leg.profiles.len(), count);
-    for (k, p) in leg.profiles.iter().enumerate() {
-        for (s, t) in times.iter().enumerate() {
-            let at = k * count + s;
-            [x.q[at], x.qd[at], x.qdd[at]] = p.at(*t);
-        }
-    }
+    let x = leg.samples(times);
     let tau = plant.nominal_torque(&x)?;
     let robot = plant.robot();
     let point = robot.tool.as_ref().map(|tool| Point::of(robot, tool));

@@ -4,13 +4,11 @@
 //! with a stated bound: see [`stretches`](crate::mechanism::stretches).
 
 use super::leg::Leg;
-use super::load::Most;
-use crate::dynamics::Samples;
+use super::most::Most;
 use crate::error::Result;
-use crate::mechanism::Mechanism;
-use crate::mechanism::PosePeak;
 use crate::mechanism::smooth::{Smooth, Stretch};
 use crate::mechanism::stretches::Reached;
+use crate::mechanism::{Mechanism, PosePeak};
 use crate::trajectory::certificate::{JointCertificate, Proof};
 
 /// Samples of a leg, at least, and of each stretch of it.
@@ -58,19 +56,11 @@ pub fn reached(mechanism: &Mechanism, leg: &Leg) -> Result<Reached> {
         });
         at.extend((0..=count).map(|i| ends[0] + i as f64 * step));
     }
-    let count = at.len();
-    let mut x = Samples::zeros(leg.profiles.len(), count);
-    for (k, p) in leg.profiles.iter().enumerate() {
-        for (s, t) in at.iter().enumerate() {
-            let at = k * count + s;
-            [x.q[at], x.qd[at], x.qdd[at]] = p.at(*t);
-        }
-    }
     let task = |c: f64, r: f64| {
         let profiles = leg.profiles.iter();
         profiles.map(|p| p.enclosure(c, r)).collect()
     };
-    mechanism.reached(&x, &Smooth::Stretches(stretches), &task)
+    mechanism.reached(&leg.samples(&at), &Smooth::Stretches(stretches), &task)
 }
 
 /// Raises the limit that is used most by what a leg reaches, `share` of those of velocity, acceleration and jerk being allowed.

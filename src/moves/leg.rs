@@ -2,6 +2,7 @@
 
 use super::profile::Profile;
 use crate::collision::clearance::Path;
+use crate::dynamics::Samples;
 
 /// A part of a move between two states.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +40,18 @@ impl Leg {
         // what lies closer is rounding
         others.dedup_by(|b, a| *b - *a < 1e-12 * self.duration);
         others
+    }
+
+    /// Positions, velocities and accelerations at some times.
+    pub fn samples(&self, times: &[f64]) -> Samples {
+        let mut x = Samples::zeros(self.profiles.len(), times.len());
+        for (k, p) in self.profiles.iter().enumerate() {
+            for (s, t) in times.iter().enumerate() {
+                let at = k * times.len() + s;
+                [x.q[at], x.qd[at], x.qdd[at]] = p.at(*t);
+            }
+        }
+        x
     }
 
     /// The same positions, `factor` times as slow.

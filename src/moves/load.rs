@@ -4,6 +4,7 @@
 use super::bound::{Bounds, bounds};
 use super::closed;
 use super::leg::Leg;
+use super::most::Most;
 use super::tool::ToolPeak;
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -20,8 +21,6 @@ const SLOWEST: f64 = 1e6;
 /// Factor to which slowness is found, and times that a slowed leg is slowed by it again, where its own samples ask for it.
 const CLOSE: f64 = 1.01;
 const AGAIN: usize = 30;
-/// Share of a limit that counts as kept.
-const KEPT: f64 = 1.0 + 1e-6;
 
 /// Largest torque of an actuator during a move.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -45,41 +44,12 @@ pub struct TorquePeak {
     pub rate_bound: Option<f64>,
 }
 
-/// The limit that is used most.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Most {
-    /// share; 1 at the limit
-    pub used: f64,
-    /// what it is about
-    pub what: String,
-}
-
-impl Most {
-    pub fn offer(&mut self, used: f64, what: impl FnOnce() -> String) {
-        // what is not a number is beyond every limit
-        if used > self.used || used.is_nan() {
-            self.used = if used.is_nan() { f64::INFINITY } else { used };
-            self.what = what();
-        }
-    }
-
-    /// Whether the limit holds.
-    pub fn kept(&self) -> bool {
-        self.used <= KEPT
-    }
-}
-
 /// Samples of a leg, ends included, and the time between two of them.
 fn samples(leg: &Leg) -> (Samples, f64) {
     let count = ((leg.duration * RATE) as usize).clamp(FEWEST, MOST) + 1;
-    let mut x = Samples::zeros(leg.profiles.len(), count);
-    for (k, p) in leg.profiles.iter().enumerate() {
-        for s in 0..count {
-            let at = k * count + s;
-            [x.q[at], x.qd[at], x.qdd[at]] = p.at(leg.duration * s as f64 / (count - 1) as f64);
-        }
-    }
-    (x, leg.duration / (count - 1) as f64)
+    let times = (0..count).map(|s| leg.duration * s as f64 / (count - 1) as f64);
+    let times: Vec<f64> = times.collect();
+    (leg.samples(&times), leg.duration / (count - 1) as f64)
 }
 
 /// The same samples `factor` times as slow; without end: at rest.
@@ -193,14 +163,20 @@ pub fn bearable(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Mos
         }
         (low, high) = (high, 1.0 + 2.0 * (high - 1.0));
     }
+    let high = narrowed(low, high, |f| Ok(used(&leg.stretched(f))?.kept()))?;
+    Ok(Ok(leg.stretched(high)))
+}
+
+/// The least factor that is kept, to [`CLOSE`], between one that is not and one that is.
+fn narrowed(mut low: f64, mut high: f64, kept: impl Fn(f64) -> Result<bool>) -> Result<f64> {
     while high > CLOSE * low {
         let middle = 0.5 * (low + high);
-        match used(&leg.stretched(middle))?.kept() {
+        match kept(middle)? {
             true => high = middle,
             false => low = middle,
         }
     }
-    Ok(Ok(leg.stretched(high)))
+    Ok(high)
 }
 
 /// The limit that bounds use most, `share` of those of velocity, acceleration and jerk of a closed chain's joints being allowed.
@@ -273,13 +249,7 @@ fn sampled(plant: &Plant, leg: &Leg) -> Result<std::result::Result<Leg, Most>> {
     while high < SLOWEST && !slow(high)?.kept() {
         (low, high) = (high, 2.0 * high);
     }
-    while high > CLOSE * low {
-        let middle = 0.5 * (low + high);
-        match slow(middle)?.kept() {
-            true => high = middle,
-            false => low = middle,
-        }
-    }
+    let high = narrowed(low, high, |f| Ok(slow(f)?.kept()))?;
     let mut slow = leg.stretched(high);
     // its own samples lie elsewhere than those that were slowed
     for _ in 0..AGAIN {

@@ -18,6 +18,7 @@
 //! | `plan` | all of it together |
 //! | `bound` | torques, their rates and the tool point between samples |
 //! | `closed` | the same of parallel robots, with the motion of the actuators |
+//! | `most` | the limit that is used most |
 //! | `load` | torques and their rates along a leg, sampled |
 //! | `tool` | speed of the tool point, sampled |
 //! | `rehearsal` | a motion at several speeds: torques, power, samples, bytes |
@@ -28,6 +29,7 @@ mod guard;
 mod leg;
 mod limits;
 mod load;
+mod most;
 mod moving;
 pub mod parts;
 mod peaks;

@@ -3,7 +3,8 @@
 use super::guard::{Blocked, Guard, Line};
 use super::leg::Leg;
 use super::limits::{by_position, inside, limits, raised, scaled, still_at};
-use super::load::{Most, all_bounds, bearable, peaks, tool};
+use super::load::{all_bounds, bearable, peaks, tool};
+use super::most::Most;
 use super::moving::{braked, through};
 use super::planner::{Found, search};
 use super::profile::Profile;
