@@ -69,19 +69,12 @@ impl Question {
         let platform = tool.is_some_and(|t| plant.robot().bodies[t].name == "platform");
         match self {
             Question::Load if tool.is_none() => no("has no body that could carry a load"),
-            Question::Platform | Question::Legs if !plant.closed() => no(
-                "is no parallel robot and has neither platform nor legs; --for load asks for what its last body \
-                 carries, --for friction for its drives, and without --for for all of its bodies",
+            Question::Platform | Question::Legs if !platform => no(
+                "is no parallel robot with a platform on legs, for it has no body called `platform`; --for load asks for what \
+                 its last body carries, --for friction for its drives, and without --for for all of its bodies",
             ),
-            Question::Platform if !platform => {
-                no("has no body called `platform`; without --for all of its bodies are asked for")
-            }
-            Question::Legs if !platform => {
-                no("has no platform and so no legs; without --for all of its bodies are asked for")
-            }
             Question::Legs if !plant.parameters().iter().any(|p| of_legs(plant, p.kind)) => no(
-                "has no unknowns of its legs: its file takes them as known; set `bodies = \"legs\"` or \
-                 `bodies = \"all\"`",
+                "has no unknowns of its legs: its file takes them as known; set `bodies = \"legs\"`",
             ),
             _ => Ok(()),
         }

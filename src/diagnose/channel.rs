@@ -47,7 +47,7 @@ impl Channel {
         };
         let mut lead = data.lead;
         // no machine's friction does that: looked for where a log may be a simulator's
-        if (coarse || assumed) && !data.plant.closed() {
+        if (coarse || assumed) && data.may_lead() {
             let step = T.reversals.step;
             let all = e.project(&[curved, data.slope(&model), data.earlier(&phi, step)]);
             let fit = e.fit(&[&all]);

@@ -60,7 +60,7 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
         .iter()
         .filter(|e| e.hides())
         .flat_map(|e| {
-            e.places(cx).into_iter().flat_map(move |place| {
+            e.sites(cx).into_iter().flat_map(move |place| {
                 let shapes = e.shapes(cx, &place);
                 shapes
                     .into_iter()

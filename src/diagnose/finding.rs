@@ -218,7 +218,7 @@ pub fn carried(
     let at = data.free_load?;
     let effect = effects.iter().find(|e| e.card().name == "payload")?;
     let card = effect.card();
-    let place = *effect.places(cx).first()?;
+    let place = *effect.sites(cx).first()?;
     let eta = phi.get(at..at + 10)?.to_vec();
     let scale = super::verdict::inflation(&evidence.residual(&[], &evidence.fit(&[])), data.fitted);
     let std: Vec<f64> = (at..at + 10).map(|i| scale * evidence.std(i)).collect();

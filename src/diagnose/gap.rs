@@ -110,12 +110,7 @@ pub fn energies(
             for (k, r) in data.records.iter().enumerate() {
                 if pick(r) {
                     let [a, b, variance] = parts(r, j, &residual[j][data.span(k)]);
-                    // of a closed chain, what differs between periods is taken off already
-                    let differs = match data.plant.closed() {
-                        true => (variance - 1.0).max(0.0),
-                        false => 0.0,
-                    };
-                    let same = (data.noise[j].excess - differs).max(0.0);
+                    let same = (data.noise[j].excess - data.differing(variance)).max(0.0);
                     sum[0] += a - same * r.counts(j) as f64;
                     sum[1] += b;
                 }

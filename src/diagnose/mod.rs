@@ -26,6 +26,7 @@ pub(crate) mod at_rest;
 pub(crate) mod carried;
 #[doc(hidden)]
 pub mod catalogue;
+mod chain;
 mod channel;
 pub(crate) mod closeness;
 pub(crate) mod column;

@@ -147,7 +147,7 @@ impl Data<'_> {
     ) -> (Cow<'r, [f64]>, f64) {
         let span = self.span(k);
         let piece = &residual[span.clone()];
-        if !self.plant.closed() {
+        if !self.sticks() {
             return (Cow::Borrowed(piece), self.records[k].counts(j) as f64);
         }
         let rows = piece.iter().zip(&self.weights[j][span]);

@@ -29,7 +29,7 @@ impl Data<'_> {
             if coulomb == 0.0 {
                 continue;
             }
-            self.weights[j] = match self.plant.closed() {
+            self.weights[j] = match self.sticks() {
                 false => self.doubt(j, coulomb),
                 true => self.sticking(j),
             };

@@ -297,7 +297,7 @@ pub fn singles(
     let tasks: Vec<(usize, Place)> = effects
         .iter()
         .enumerate()
-        .flat_map(|(e, effect)| effect.places(cx).into_iter().map(move |p| (e, p)))
+        .flat_map(|(e, effect)| effect.sites(cx).into_iter().map(move |p| (e, p)))
         .collect();
     let mut all: Vec<Candidate> = tasks
         .par_iter()

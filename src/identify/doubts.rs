@@ -95,7 +95,7 @@ fn masses(plant: &Plant, id: &Identification) -> Vec<Warning> {
 fn carrying(plant: &Plant, body: usize) -> Option<String> {
     let robot = plant.robot();
     let gravity = robot.gravity;
-    if plant.closed() || gravity.norm() == 0.0 {
+    if gravity.norm() == 0.0 || plant.driver(body).is_none() {
         return None;
     }
     let down = gravity / gravity.norm();
@@ -126,9 +126,6 @@ fn carrying(plant: &Plant, body: usize) -> Option<String> {
 
 /// Joints without an unknown rotor whose residual goes with their acceleration.
 fn missing(plant: &Plant, traces: &[Trace]) -> Vec<Warning> {
-    if plant.closed() {
-        return Vec::new();
-    }
     let armature = JointTerm::Armature as usize;
     let joints = plant.actuators();
     let without = (0..joints.len()).filter(|a| !joints[*a].identify[armature]);

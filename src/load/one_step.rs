@@ -19,7 +19,7 @@ use super::body::LoadBody;
 use super::records::Loaded;
 use super::settings::{Parameters, Settings};
 use super::suspicion;
-use super::system::System;
+use super::system::{System, of_platform};
 use super::weight::Spread;
 use crate::error::{Result, Warning, WarningKind};
 use crate::log::Payload;
@@ -107,7 +107,7 @@ pub fn estimate(
         records: (0..system.parts.len())
             .map(|p| fitted::fitted(&solver, &solution, &all, &load, p))
             .collect(),
-        platform: (empty && plant.closed()).then(|| ten::platform(&system, &solution)),
+        platform: (empty && of_platform(plant)).then(|| ten::platform(&system, &solution)),
         zeros,
         stream,
         load,

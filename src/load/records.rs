@@ -1,6 +1,7 @@
 //! The records: with torques from chamber pressures where they have none, and with what they carried.
 
 use super::settings::Settings;
+use super::suspicion::looks_at;
 use crate::error::{Error, Result};
 use crate::log::{Experiment, Payload, Record};
 use crate::plant::Plant;
@@ -25,7 +26,7 @@ pub fn prepared(experiment: &Experiment, settings: &Settings) -> Result<Vec<Load
     let plant = &experiment.plant;
     let one = |record: &Record| {
         let pressed = record.with_forces(plant, settings.atmosphere)?;
-        let exchanged = match (&pressed, settings.checked && plant.closed()) {
+        let exchanged = match (&pressed, settings.checked && looks_at(plant)) {
             (Some(_), true) => exchanged(record, plant, settings)?,
             _ => None,
         };

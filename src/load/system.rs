@@ -92,10 +92,15 @@ pub struct System {
     pub deviations: Vec<String>,
 }
 
+/// Whether only the platform may deviate in the empty robot, since legs seldom do.
+pub(super) fn of_platform(plant: &Plant) -> bool {
+    plant.closed()
+}
+
 /// Columns of what may deviate in the empty robot: all bodies and armatures of a serial robot, the
 /// platform of a parallel one.
 fn deviation_columns(plant: &Plant, tool: usize, x: &Samples) -> Result<(Mat<f64>, Vec<String>)> {
-    if plant.closed() {
+    if of_platform(plant) {
         let names = crate::robot::inertia::NAMES.map(|n| format!("platform.{n}"));
         return Ok((plant.body_columns(tool, x)?, names.to_vec()));
     }

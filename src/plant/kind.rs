@@ -25,6 +25,17 @@ impl Plant {
             .is_some_and(|m| matches!(m.source, Source::Loops(_)))
     }
 
+    /// The actuator that moves a body by itself; none where all of them move it together.
+    pub fn driver(&self, body: usize) -> Option<usize> {
+        let alone = !self.closed();
+        alone.then(|| self.robot.bodies[body].coordinate)
+    }
+
+    /// How many numbers of its geometry may deviate, as the file states them; 0 where they are not known one by one.
+    pub(crate) fn deviations(&self) -> usize {
+        self.mechanism().map_or(0, |m| m.deviations())
+    }
+
     /// Coordinates from positions of the actuators, coordinate-major, `count` samples each: as
     /// [`Plant::coordinates_of`], with forward kinematics from the pose `start` on.
     ///

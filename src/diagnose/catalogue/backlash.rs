@@ -16,10 +16,11 @@ impl Effect for Backlash {
             separated_by: "a bias torque by gravity: backlash vanishes, Coulomb friction stays",
         }
     }
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if !cx.serial() {
-            return Vec::new();
-        }
         // the transmitted torque must change its sign
         let crosses = |j: &usize| {
             let (lo, hi) = cx.rigid[*j]

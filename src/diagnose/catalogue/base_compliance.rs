@@ -18,12 +18,12 @@ impl Effect for BaseCompliance {
             separated_by: "the same pose with another moment on the base",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Place> {
-        if cx.serial() {
-            vec![Place::Robot]
-        } else {
-            Vec::new()
-        }
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
+    fn places(&self, _cx: &Context) -> Vec<Place> {
+        vec![Place::Robot]
     }
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
@@ -185,9 +185,6 @@ pub struct Load {
 impl Load {
     /// Of the nominal model; `None` for robots that are not serial.
     pub fn of(cx: &Context) -> Option<Self> {
-        if !cx.serial() {
-            return None;
-        }
         let robot = cx.data.plant.robot();
         let tree = crate::dynamics::Tree::new(&on_joints(robot));
         let mut out = Load {
@@ -225,9 +222,6 @@ pub(crate) fn tilted(
     cx: &Context,
     motion: impl Fn(&Series, usize, usize) -> [Vec<f64>; 3],
 ) -> Vec<Column> {
-    if !cx.serial() {
-        return Vec::new();
-    }
     let robot = cx.data.plant.robot();
     let tree = crate::dynamics::Tree::new(&on_joints(robot));
     let n = cx.data.joints();

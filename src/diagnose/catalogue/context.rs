@@ -1,8 +1,8 @@
 //! What columns of effects are computed from: the records, the nominal model as fitted, and its torques.
 
-use super::base_compliance;
 use super::estimate::{Place, Quantity};
 use super::leg_geometry::Deformations;
+use super::{Robots, base_compliance};
 use crate::diagnose::column::Column;
 use crate::diagnose::data::Data;
 use crate::diagnose::window::averaged;
@@ -51,7 +51,7 @@ impl<'a> Context<'a> {
             .map(|r| r.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-9))
             .collect();
         let mut mass = Vec::new();
-        if !data.plant.closed() {
+        if Robots::Open.hold(data.plant) {
             for j in 0..data.joints() {
                 let more = data.torque_of(&phi, |r, _, x| {
                     x.qdd[j * r.count..(j + 1) * r.count]
@@ -119,11 +119,6 @@ impl<'a> Context<'a> {
     /// Every actuator by itself.
     pub fn singles(&self) -> Vec<Place> {
         (0..self.data.joints()).map(Place::Actuator).collect()
-    }
-
-    /// Whether it is a serial robot.
-    pub fn serial(&self) -> bool {
-        !self.data.plant.closed()
     }
 
     /// Actuators whose nominal model has no unknown of this kind.

@@ -25,10 +25,11 @@ impl Effect for Counterbalance {
         3.0
     }
 
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if !cx.serial() {
-            return Vec::new();
-        }
         let robot = cx.data.plant.robot();
         // only where weight acts
         (0..cx.data.joints())

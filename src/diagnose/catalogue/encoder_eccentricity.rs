@@ -20,10 +20,11 @@ impl Effect for EncoderEccentricity {
         true
     }
 
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if !cx.serial() {
-            return Vec::new();
-        }
         let turns = |j: &usize| cx.motion(*j) == Motion::Revolute;
         (0..cx.data.joints())
             .filter(turns)

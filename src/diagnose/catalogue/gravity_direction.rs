@@ -34,11 +34,10 @@ impl Effect for GravityDirection {
     }
 
     fn columns(&self, cx: &Context, _place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
-        if !cx.serial() {
-            return turned(cx).unwrap_or_default();
-        }
-        base_compliance::tilted(cx, |r, _, _| {
-            [vec![1.0; r.count], vec![0.0; r.count], vec![0.0; r.count]]
+        turned(cx).unwrap_or_else(|| {
+            base_compliance::tilted(cx, |r, _, _| {
+                [vec![1.0; r.count], vec![0.0; r.count], vec![0.0; r.count]]
+            })
         })
     }
 

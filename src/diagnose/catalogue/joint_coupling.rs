@@ -16,11 +16,12 @@ impl Effect for JointCoupling {
             separated_by: "one of the two joints moved with the other still, and both with opposite speed",
         }
     }
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
         let n = cx.data.joints();
-        if !cx.serial() {
-            return Vec::new();
-        }
         (1..n)
             .filter(|k| cx.motion(*k) == cx.motion(k - 1))
             .map(|k| Place::Pair(k - 1, k))

@@ -16,12 +16,12 @@ impl Effect for JointElasticity {
             separated_by: "high harmonics, a locked output, or a second encoder",
         }
     }
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if cx.serial() {
-            cx.singles()
-        } else {
-            Vec::new()
-        }
+        cx.singles()
     }
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {

@@ -21,12 +21,12 @@ impl Effect for JointOffset {
         true
     }
 
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if cx.serial() {
-            cx.singles()
-        } else {
-            Vec::new()
-        }
+        cx.singles()
     }
 
     fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {

@@ -62,9 +62,12 @@ impl Effect for LegGeometry {
         1.0
     }
 
+    fn robots(&self) -> Robots {
+        Robots::Closed
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        let known = cx.data.plant.mechanism().map_or(0, |m| m.deviations());
-        match known {
+        match cx.data.plant.deviations() {
             0 => Vec::new(),
             _ => std::iter::once(Place::Robot).chain(cx.singles()).collect(),
         }

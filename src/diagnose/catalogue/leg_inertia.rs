@@ -21,6 +21,10 @@ impl Effect for LegInertia {
         true
     }
 
+    fn robots(&self) -> Robots {
+        Robots::Closed
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
         match unknowns(cx).is_empty() {
             true => Vec::new(),
@@ -81,7 +85,7 @@ const REVOLUTION: [&[usize]; 4] = [&[0], &[3], &[4, 7], &[9]];
 /// count as massless.
 fn unknowns(cx: &Context) -> Vec<Unknown> {
     // the links of a general closed chain have no common axes
-    if !cx.data.plant.closed() || cx.data.plant.looped() {
+    if cx.data.plant.looped() {
         return Vec::new();
     }
     let stands = |body: usize| {

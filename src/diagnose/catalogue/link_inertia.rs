@@ -27,10 +27,11 @@ impl Effect for LinkInertia {
         true
     }
 
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if !cx.serial() {
-            return Vec::new();
-        }
         cx.data
             .plant
             .robot()

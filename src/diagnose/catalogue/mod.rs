@@ -72,12 +72,44 @@ pub struct Card {
     pub separated_by: &'static str,
 }
 
+/// The robots that an effect is told of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Robots {
+    /// every one
+    All,
+    /// serial and tree robots: what moves a link shows in the torques of the joints before it
+    Open,
+    /// parallel robots: what only legs and passive joints have
+    Closed,
+}
+
+impl Robots {
+    /// Whether a robot is one of them.
+    fn hold(self, plant: &plant::Plant) -> bool {
+        match self {
+            Robots::All => true,
+            one => plant.closed() == (one == Robots::Closed),
+        }
+    }
+}
+
 /// An effect of the catalogue.
 pub trait Effect: Sync {
     /// What is known about it.
     fn card(&self) -> Card;
-    /// Where it can sit.
+    /// Which robots it is told of.
+    fn robots(&self) -> Robots {
+        Robots::All
+    }
+    /// Where it can sit on a robot of [`Effect::robots`].
     fn places(&self, cx: &Context) -> Vec<Place>;
+    /// Where it can sit on this robot.
+    fn sites(&self, cx: &Context) -> Vec<Place> {
+        match self.robots().hold(cx.data.plant) {
+            true => self.places(cx),
+            false => Vec::new(),
+        }
+    }
     /// Shapes to try.
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
         vec![Shape::default()]

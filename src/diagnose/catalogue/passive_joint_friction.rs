@@ -16,12 +16,12 @@ impl Effect for PassiveJointFriction {
             separated_by: "rotations of the platform at constant leg speed",
         }
     }
-    fn places(&self, cx: &Context) -> Vec<Place> {
-        if cx.serial() {
-            Vec::new()
-        } else {
-            vec![Place::Robot]
-        }
+    fn robots(&self) -> Robots {
+        Robots::Closed
+    }
+
+    fn places(&self, _cx: &Context) -> Vec<Place> {
+        vec![Place::Robot]
     }
 
     fn apply(&self, cx: &Context, e: &Estimate, robot: &mut Robot) -> Option<Part> {

@@ -29,12 +29,9 @@ impl Effect for Payload {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        match (cx.serial(), cx.data.plant.robot().bodies.last()) {
-            (true, Some(last)) => vec![Place::Actuator(last.coordinate)],
-            (true, None) => Vec::new(),
-            // the platform is moved by all actuators
-            (false, _) => vec![Place::Robot],
-        }
+        let plant = cx.data.plant;
+        let place = |body| plant.driver(body).map_or(Place::Robot, Place::Actuator);
+        plant.tool().map(place).into_iter().collect()
     }
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
@@ -68,16 +65,18 @@ impl Effect for Payload {
             return Vec::new();
         };
         let count = if shape.form == POINT { 4 } else { 10 };
-        if cx.serial() {
-            return link_inertia::body_columns(cx, body, count);
-        }
         let size = 10 * cx.data.plant.robot().bodies.len();
         let column = |k: usize| {
             let mut phi = vec![0.0; size];
             phi[10 * body + k] = 1.0;
             closed_column(cx, &phi)
         };
-        (0..count).map_while(column).collect()
+        match column(0) {
+            Some(first) => std::iter::once(first)
+                .chain((1..count).map_while(column))
+                .collect(),
+            None => link_inertia::body_columns(cx, body, count),
+        }
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {

@@ -210,7 +210,7 @@ fn every_effect_keeps_its_promises() {
         // one candidate of every effect, place and form
         let mut list: Vec<(usize, Place, Shape, Vec<Column>)> = Vec::new();
         for (i, effect) in effects.iter().enumerate() {
-            let places = effect.places(&cx);
+            let places = effect.sites(&cx);
             let mut few: Vec<Place> = places.first().copied().into_iter().collect();
             // the last joint may be one that slides
             few.extend(places.last().copied().filter(|p| Some(p) != places.first()));

@@ -16,12 +16,12 @@ impl Effect for TransmissionError {
             separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
         }
     }
+    fn robots(&self) -> Robots {
+        Robots::Open
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
-        if cx.serial() {
-            cx.singles()
-        } else {
-            Vec::new()
-        }
+        cx.singles()
     }
 
     fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {

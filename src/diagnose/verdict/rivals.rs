@@ -137,7 +137,7 @@ pub fn rivals(m: &Beside, list: &[Candidate]) -> Vec<Rival> {
 /// anywhere may stand for the parameters, and leave what moves otherwise.
 fn in_rows(m: &Beside, r: &Candidate) -> Option<f64> {
     let st = m.st;
-    if !(m.frozen && st.evidence.data.plant.closed()) {
+    if !(m.frozen && st.evidence.data.shared()) {
         return None;
     }
     let mut both = m.set.to_vec();

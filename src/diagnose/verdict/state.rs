@@ -57,7 +57,7 @@ impl State<'_> {
     /// Factor on what counts per row, for a member of a set of so many. A second name must stand out as on any robot:
     /// what a first one leaves of a large gap is not all of its shape.
     pub fn scale(&self, members: usize) -> f64 {
-        match self.evidence.data.plant.closed() && members == 1 {
+        match self.evidence.data.sticks() && members == 1 {
             true => T.matters.closed,
             false => 1.0,
         }

@@ -4,7 +4,7 @@
 use crate::collision::scene::{self, Scene};
 use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::mechanism::{Mechanism, Segment};
+use crate::mechanism::Segment;
 use crate::plant::Plant;
 use crate::report::html::{self, Section};
 use crate::report::plot::{Colour, Shape as Drawn};
@@ -62,11 +62,7 @@ pub(in crate::identifiability) fn fill(
     let robot = plant.robot();
     let tree = plant.joint_motion(motion)?;
     let count = motion.count.max(1);
-    let lines = |samples: &[usize]| {
-        plant
-            .mechanism()
-            .and_then(|m| Lines::of(m, motion, samples))
-    };
+    let lines = |samples: &[usize]| Lines::of(plant, motion, samples);
     let first = lines(&[0]).map_or(0, |l| l.names.len());
     // of a chain that is drawn by lines only the bodies with volumes are needed
     let mut shown: Vec<bool> = vec![first == 0; robot.bodies.len()];
@@ -85,7 +81,7 @@ pub(in crate::identifiability) fn fill(
         let carries = robot.bodies.iter().any(|k| k.parent == Some(b));
         let far = |c: &Vector3<f64>| c.norm() > 1e-3;
         let com = robot.bodies[b].inertia.com().filter(far);
-        com.filter(|_| !carries && !plant.closed())
+        com.filter(|_| !carries && plant.driver(b).is_some())
     };
     let joints = plant.actuators();
     let mut view = View {
@@ -291,7 +287,8 @@ struct Lines {
 
 impl Lines {
     /// `None` where there are none, or not the same ones everywhere.
-    fn of(mechanism: &Mechanism, motion: &Samples, samples: &[usize]) -> Option<Self> {
+    fn of(plant: &Plant, motion: &Samples, samples: &[usize]) -> Option<Self> {
+        let mechanism = plant.mechanism()?;
         let count = motion.count;
         let mut names: Option<Vec<String>> = None;
         let mut ends = Vec::with_capacity(samples.len());

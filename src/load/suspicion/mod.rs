@@ -29,13 +29,18 @@ pub fn raw(experiment: &Experiment, atmosphere: f64) -> Result<()> {
     Ok(())
 }
 
+/// Whether drives, legs and exchanged records can be told by the equations: where one load is held by all drives together.
+pub fn looks_at(plant: &Plant) -> bool {
+    plant.closed()
+}
+
 /// Where the records are equations: drives, legs and records that are exchanged or turned. Closed chains only; what a
 /// serial robot's joints are told by is looked at with its log.
 ///
 /// # Errors
 /// A log that fits the robot only if it is read otherwise than stated.
 pub fn prepared(plant: &Plant, tool: usize, system: &System) -> Result<Vec<Warning>> {
-    if plant.mechanism().is_none() {
+    if !looks_at(plant) {
         return Ok(Vec::new());
     }
     let warnings = forces(plant, tool, system)?;
