@@ -43,7 +43,8 @@ pub(super) fn section(a: &Answer) -> Section {
         p {
             "Expected of one record of " (with_unit(a.seconds, 3, "s")) " of this motion, evaluated with " code { "excite identify" }
             ". ± is the 95\u{a0}% interval at the torque noise of the robot file, white. Coulomb and viscous friction and a constant of every \
-             drive are estimated along; breakaway friction, too, with its speed, where the robot file states it."
+             drive are estimated along; breakaway friction, too, with its speed, where the robot file states it. "
+            (bodies(a.question))
         }
         (html::table(&["value", "in the robot file", "±", "unit", "relative"], &[2, 3, 5], &rows))
     };
@@ -51,4 +52,16 @@ pub(super) fn section(a: &Answer) -> Section {
         format!("What this motion tells of {}", subject(a.question)),
         body,
     )
+}
+
+/// What is done about the bodies that are not asked for.
+fn bodies(question: Question) -> &'static str {
+    match question {
+        Question::Load => "The robot itself is known from its records without a load.",
+        Question::Platform => {
+            "The other bodies count as known; with unknown legs a part of their mass adds to the platform's."
+        }
+        Question::Legs => "The platform is estimated along.",
+        Question::Friction => "All bodies are estimated along.",
+    }
 }
