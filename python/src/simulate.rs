@@ -7,7 +7,7 @@ use excite::plant::Plant as Core;
 use excite::simulate::effects::parse_payload;
 use excite::simulate::monte_carlo::monte_carlo;
 use excite::simulate::parts::Field;
-use excite::simulate::record::{Sensors, measure, poses};
+use excite::simulate::record::{Sensors, measure};
 use excite::simulate::{Settings, simulate as simulated};
 use excite::{Error, Result};
 use numpy::{IntoPyArray, PyArray1};
@@ -123,7 +123,7 @@ pub fn simulate<'py>(
         warnings.extend(run.warnings.iter().cloned());
         let measured = measure(&run, &sensors, &settings.effects, settings.seed);
         let pose = match pose {
-            true => poses(&plant, &run)?,
+            true => plant.pose_columns(&run.motion)?,
             false => Vec::new(),
         };
         let spread = match monte_carlo_ {

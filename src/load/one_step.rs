@@ -16,10 +16,10 @@ pub use stream::Step;
 pub use zeros::Decision;
 
 use super::body::LoadBody;
-use super::records::Loaded;
+use super::records::{Loaded, of_platform};
 use super::settings::{Parameters, Settings};
 use super::suspicion;
-use super::system::{System, of_platform};
+use super::system::System;
 use super::weight::Spread;
 use crate::error::{Result, Warning, WarningKind};
 use crate::log::Payload;

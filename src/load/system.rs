@@ -1,7 +1,7 @@
 //! The linear system of all records: torques that the nominal model does not explain, and the
 //! columns that may.
 
-use super::records::Loaded;
+use super::records::{Loaded, of_platform};
 use crate::base::BaseParameters;
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -90,11 +90,6 @@ pub struct System {
     pub base: BaseParameters,
     /// names of the deviations
     pub deviations: Vec<String>,
-}
-
-/// Whether only the platform may deviate in the empty robot, since legs seldom do.
-pub(super) fn of_platform(plant: &Plant) -> bool {
-    plant.closed()
 }
 
 /// Columns of what may deviate in the empty robot: all bodies and armatures of a serial robot, the

@@ -5,6 +5,7 @@ use super::Mechanism;
 use super::task::{Task, from_quaternion, rpy};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
+use nalgebra::{Rotation3, UnitQuaternion};
 use rayon::prelude::*;
 
 /// Samples between the starts of pieces that are walked on different threads.
@@ -143,4 +144,36 @@ pub fn from_pose(mechanism: &Mechanism, pose: &[Vec<f64>]) -> Result<Vec<f64>> {
         last = row;
     }
     Ok(x)
+}
+
+/// Measured pose columns `x y z qw qx qy qz` of a motion of the task coordinates: the inverse of [`from_pose`].
+///
+/// # Errors
+/// A mechanism without a platform; a pose that cannot be reached.
+pub fn to_pose(mechanism: &Mechanism, motion: &Samples) -> Result<Vec<Vec<f64>>> {
+    let motion = mechanism.platform_motion(motion)?;
+    let (m, count) = (motion.dof, motion.count);
+    let zero = vec![0.0; m];
+    let mut columns: Vec<Vec<f64>> = (0..7).map(|_| Vec::with_capacity(count)).collect();
+    let mut last: Option<UnitQuaternion<f64>> = None;
+    for k in 0..count {
+        let x: Vec<f64> = (0..m).map(|c| motion.q[c * count + k]).collect();
+        let Some(pose) = mechanism.platform().task.motion(&x, &zero, &zero) else {
+            return Err(Error::Argument(
+                "this mechanism has joints, not a platform, as its coordinates".into(),
+            ));
+        };
+        let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
+        let mut q = UnitQuaternion::from_rotation_matrix(&rotation);
+        // the sign that is nearest to the one before: no jumps in a log
+        if last.is_some_and(|l| l.coords.dot(&q.coords) < 0.0) {
+            q = UnitQuaternion::new_unchecked(-q.into_inner());
+        }
+        last = Some(q);
+        let p = pose.position;
+        for (column, v) in columns.iter_mut().zip([p.x, p.y, p.z, q.w, q.i, q.j, q.k]) {
+            column.push(v);
+        }
+    }
+    Ok(columns)
 }

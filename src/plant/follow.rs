@@ -3,7 +3,7 @@
 use super::Plant;
 use crate::dynamics::Samples;
 use crate::error::{Error, Result};
-use crate::mechanism::follow;
+use crate::mechanism::{Mechanism, follow};
 
 pub use crate::mechanism::follow::Rates;
 
@@ -25,13 +25,24 @@ impl Plant {
     /// # Errors
     /// A robot without a platform, or a quaternion that is none.
     pub fn coordinates_of_pose(&self, pose: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
-        match self.mechanism() {
-            None => Err(Error::Argument(format!(
-                "{} has no platform whose pose could be measured",
+        Ok(lists(follow::from_pose(self.platform()?, pose)?, pose))
+    }
+
+    /// Measured pose columns of a motion of the coordinates: the inverse of [`Plant::coordinates_of_pose`].
+    ///
+    /// # Errors
+    /// A robot without a platform; a pose that cannot be reached.
+    pub fn pose_columns(&self, x: &Samples) -> Result<Vec<Vec<f64>>> {
+        follow::to_pose(self.platform()?, x)
+    }
+
+    fn platform(&self) -> Result<&Mechanism> {
+        self.mechanism().ok_or_else(|| {
+            Error::Argument(format!(
+                "{} has no platform whose pose could be measured; that is for parallel robots",
                 self.name()
-            ))),
-            Some(mechanism) => Ok(lists(follow::from_pose(mechanism, pose)?, pose)),
-        }
+            ))
+        })
     }
 
     /// Velocities of the coordinates, and accelerations where there are any, from measured ones of

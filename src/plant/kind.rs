@@ -1,8 +1,9 @@
 //! What kind of robot a plant is, for what only one kind has.
 
 use super::Plant;
+use crate::dynamics::Samples;
 use crate::error::Result;
-use crate::mechanism::Source;
+use crate::mechanism::{MechanismMotion, Segment, Source};
 
 impl Plant {
     /// Whether something closes the tree to a chain: a parallel robot.
@@ -34,6 +35,46 @@ impl Plant {
     /// How many numbers of its geometry may deviate, as the file states them; 0 where they are not known one by one.
     pub(crate) fn deviations(&self) -> usize {
         self.mechanism().map_or(0, |m| m.deviations())
+    }
+
+    /// Change of the actuator forces per unit of each of [`Plant::deviations`], with these values of the unknowns and this
+    /// load in the body that carries one; empty where there are none.
+    ///
+    /// # Errors
+    /// Poses that cannot be reached.
+    pub(crate) fn deformations(
+        &self,
+        x: &Samples,
+        phi: &[f64],
+        load: Option<&[f64; 10]>,
+    ) -> Result<Vec<Vec<f64>>> {
+        let Some(mechanism) = self.mechanism() else {
+            return Ok(Vec::new());
+        };
+        let mut bodies = mechanism.bodies_with(phi);
+        if let (Some(load), Some(tool)) = (load, self.tool()) {
+            let body = bodies[10 * tool..].iter_mut();
+            body.zip(load).for_each(|(b, l)| *b += l);
+        }
+        mechanism.deformations(x, &bodies)
+    }
+
+    /// Actuator forces that stand for generalised forces of the joints of the tree, `Gᵀ Γ`, actuator-major; `None` of a
+    /// tree, where they are the same.
+    pub(crate) fn projected(
+        &self,
+        x: &Samples,
+        gamma: impl FnOnce(&MechanismMotion) -> Vec<f64>,
+    ) -> Option<Result<Vec<f64>>> {
+        let mechanism = self.mechanism()?;
+        let forces = |motion| mechanism.project(&motion, &gamma(&motion));
+        Some(mechanism.motion(x).map(forces))
+    }
+
+    /// Axes of legs, arms, rods and platform at coordinates `x`, for pictures; a tree has none.
+    pub(crate) fn segments(&self, x: &[f64]) -> Vec<Segment> {
+        self.mechanism()
+            .map_or_else(Vec::new, |m| m.geometry().segments(x))
     }
 
     /// Coordinates from positions of the actuators, coordinate-major, `count` samples each: as

@@ -1,11 +1,10 @@
 //! What the sensors make of a run, and the log that is written.
 
 use super::{Effects, Run};
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Result, Warning, WarningKind};
 use crate::log::{Payload, Purpose, Record, pressure};
 use crate::output::write_atomic;
 use crate::plant::{DEFAULT_NOISE, Plant};
-use nalgebra::{Rotation3, UnitQuaternion};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write as _;
@@ -198,7 +197,7 @@ pub fn write_log(
         data.extend(source.chunks_exact(count));
     }
     let pose = match columns.pose {
-        true => poses(plant, run)?,
+        true => plant.pose_columns(&run.motion)?,
         false => Vec::new(),
     };
     if columns.pose {
@@ -220,44 +219,4 @@ pub fn write_log(
         }
         Ok(())
     })
-}
-
-/// Columns `x y z qw qx qy qz` of the platform at all samples.
-///
-/// # Errors
-/// A robot without platform.
-pub fn poses(plant: &Plant, run: &Run) -> Result<Vec<Vec<f64>>> {
-    let count = run.t.len();
-    let Some(mechanism) = plant.mechanism() else {
-        return Err(Error::Argument(format!(
-            "--pose: {} has no platform; it is for parallel robots",
-            plant.name()
-        )));
-    };
-    let motion = mechanism.platform_motion(&run.motion)?;
-    let m = motion.dof;
-    let zero = vec![0.0; m];
-    let mut columns: Vec<Vec<f64>> = (0..7).map(|_| Vec::with_capacity(count)).collect();
-    let mut last: Option<UnitQuaternion<f64>> = None;
-    for k in 0..count {
-        let x: Vec<f64> = (0..m).map(|c| motion.q[c * count + k]).collect();
-        let Some(pose) = mechanism.platform().task.motion(&x, &zero, &zero) else {
-            return Err(Error::Argument(format!(
-                "--pose: {} has joints, not a platform, as its coordinates",
-                plant.name()
-            )));
-        };
-        let rotation = Rotation3::from_matrix_unchecked(pose.rotation);
-        let mut q = UnitQuaternion::from_rotation_matrix(&rotation);
-        // the sign that is nearest to the one before: no jumps in the log
-        if last.is_some_and(|l| l.coords.dot(&q.coords) < 0.0) {
-            q = UnitQuaternion::new_unchecked(-q.into_inner());
-        }
-        last = Some(q);
-        let p = pose.position;
-        for (column, v) in columns.iter_mut().zip([p.x, p.y, p.z, q.w, q.i, q.j, q.k]) {
-            column.push(v);
-        }
-    }
-    Ok(columns)
 }

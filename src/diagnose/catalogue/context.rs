@@ -249,11 +249,9 @@ pub(crate) fn projected(
     cx: &Context,
     gamma: impl Fn(&MechanismMotion) -> Vec<f64>,
 ) -> Option<Column> {
-    let mechanism = cx.data.plant.mechanism()?;
     let mut rows = vec![Vec::with_capacity(cx.data.rows()); cx.data.joints()];
     for r in &cx.data.records {
-        let motion = mechanism.motion(&r.x).ok()?;
-        let tau = mechanism.project(&motion, &gamma(&motion));
+        let tau = cx.data.plant.projected(&r.x, &gamma)?.ok()?;
         for (row, tau) in rows.iter_mut().zip(tau.chunks_exact(r.count)) {
             row.extend(smooth(tau));
         }

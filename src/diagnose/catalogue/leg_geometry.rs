@@ -162,20 +162,13 @@ impl Deformations {
     /// Of the bodies of the nominal model as fitted; `None` for other mechanisms than hexapods.
     pub fn of(cx: &Context) -> Option<Self> {
         let data = cx.data;
-        let mechanism = data.plant.mechanism()?;
-        let (n, count) = (data.joints(), mechanism.deviations());
+        let (n, count) = (data.joints(), data.plant.deviations());
         if count == 0 {
             return None;
         }
-        let tool = data.plant.tool()?;
         let known = &cx.phi[..data.plant.parameters().len()];
         let mut columns = vec![vec![Vec::with_capacity(data.rows()); n]; count];
         for (k, r) in data.records.iter().enumerate() {
-            let mut bodies = mechanism.bodies_with(known);
-            if let Some(load) = data.load(k, &cx.phi) {
-                let body = bodies[10 * tool..10 * tool + 10].iter_mut();
-                body.zip(load).for_each(|(b, l)| *b += l);
-            }
             let every = ((1.0 / (RATE * r.dt)) as usize).max(1);
             let points = (r.count - 1).div_ceil(every) + 1;
             let at = |i: usize| (i * every).min(r.count - 1);
@@ -191,7 +184,8 @@ impl Deformations {
                     }
                 }
             }
-            let changes = mechanism.deformations(&x, &bodies).ok()?;
+            let load = data.load(k, &cx.phi);
+            let changes = data.plant.deformations(&x, known, load.as_ref()).ok()?;
             for (column, change) in columns.iter_mut().zip(changes) {
                 for (row, values) in column.iter_mut().zip(change.chunks_exact(points)) {
                     let scaled: Vec<f64> = values.iter().map(|v| SPREAD * v).collect();

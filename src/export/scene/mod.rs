@@ -28,7 +28,8 @@ mod urdf;
 pub(crate) use page::page;
 pub use text::Change;
 
-use super::Model;
+use super::mujoco::Mujoco;
+use super::{Format, Model};
 use crate::error::{Error, Result, Warning};
 use crate::robot::file::text::read_text;
 use crate::robot::mjcf as format;
@@ -63,7 +64,7 @@ pub struct Edited {
 /// A scene that cannot be read, is not that of the robot or stands in `folder` itself; a closed chain; a body that
 /// the scene cannot hold.
 pub fn into_scene(model: &Model, scene: &Path, folder: &Path) -> Result<Edited> {
-    if model.plant.closed() {
+    if !Mujoco.holds(model.plant) {
         return Err(Error::Infeasible(format!(
             "{}: closed chains are not written into a scene",
             model.robot.name

@@ -288,13 +288,12 @@ struct Lines {
 impl Lines {
     /// `None` where there are none, or not the same ones everywhere.
     fn of(plant: &Plant, motion: &Samples, samples: &[usize]) -> Option<Self> {
-        let mechanism = plant.mechanism()?;
         let count = motion.count;
         let mut names: Option<Vec<String>> = None;
         let mut ends = Vec::with_capacity(samples.len());
         for s in samples.iter().map(|s| s % count.max(1)) {
             let x: Vec<f64> = (0..motion.dof).map(|k| motion.q[k * count + s]).collect();
-            let segments = with_bars(mechanism.geometry().segments(&x));
+            let segments = with_bars(plant.segments(&x));
             let now = || segments.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
             if segments.is_empty() || *names.get_or_insert_with(now) != now() {
                 return None;

@@ -12,6 +12,7 @@ mod positions;
 pub(super) use carried::negative;
 pub(super) use forces::check as forces;
 
+use super::records::of_platform;
 use super::system::System;
 use crate::error::{Result, Warning};
 use crate::log::{Experiment, pressure};
@@ -29,18 +30,13 @@ pub fn raw(experiment: &Experiment, atmosphere: f64) -> Result<()> {
     Ok(())
 }
 
-/// Whether drives, legs and exchanged records can be told by the equations: where one load is held by all drives together.
-pub fn looks_at(plant: &Plant) -> bool {
-    plant.closed()
-}
-
 /// Where the records are equations: drives, legs and records that are exchanged or turned. Closed chains only; what a
 /// serial robot's joints are told by is looked at with its log.
 ///
 /// # Errors
 /// A log that fits the robot only if it is read otherwise than stated.
 pub fn prepared(plant: &Plant, tool: usize, system: &System) -> Result<Vec<Warning>> {
-    if !looks_at(plant) {
+    if !of_platform(plant) {
         return Ok(Vec::new());
     }
     let warnings = forces(plant, tool, system)?;
