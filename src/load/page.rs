@@ -226,8 +226,9 @@ fn methods(found: &Identified) -> Section {
         (html::table(&head, &[], &rows))
         p {
             "Centre of mass and tensor in the frame of " (found.frame) ", the tensor about the centre of \
-             mass; ± is the 95 % interval. Differences of the tensor are relative to the geometric \
-             mean of the moments of its row and column."
+             mass. ± is the 95 % interval: it counts noise, friction and constant forces, and gains where a known \
+             load tells them. A geometry that is not that of the robot file is not in it. Differences of the tensor \
+             are relative to the geometric mean of the moments of its row and column."
         }
         @match two {
             Some(t) => p {
