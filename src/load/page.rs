@@ -214,7 +214,9 @@ fn methods(found: &Identified) -> Section {
                     }
                 };
                 row.push(cell(&t.load, i));
+                let both = determined(one)[i] && determined(&t.load)[i];
                 row.push(match i {
+                    _ if !both => html! { "–" },
                     1..=3 => html! { (significant((b[i] - a[i]) / size, 2)) " mm" },
                     _ => html! { (significant(100.0 * (b[i] - a[i]) / size, 2)) " %" },
                 });
