@@ -66,7 +66,9 @@ impl Question {
             )))
         };
         let tool = plant.tool();
-        let platform = tool.is_some_and(|t| plant.robot().bodies[t].name == "platform");
+        // a platform is moved by all actuators together
+        let named = |t| plant.driver(t).is_none() && plant.robot().bodies[t].name == "platform";
+        let platform = tool.is_some_and(named);
         match self {
             Question::Load if tool.is_none() => no("has no body that could carry a load"),
             Question::Platform | Question::Legs if !platform => no(

@@ -50,7 +50,7 @@ impl Effect for BaseCompliance {
     }
 
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
-        let base = cx.base()?;
+        let base = cx.base();
         let omega = 2.0 * std::f64::consts::PI * e.shape[0];
         // a coefficient below 1 is a base that is heavy itself; none is one that does not tilt
         let of = |axis: usize| {
@@ -69,9 +69,7 @@ impl Effect for BaseCompliance {
     }
 
     fn columns(&self, cx: &Context, _place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
-        let Some(load) = cx.base() else {
-            return Vec::new();
-        };
+        let load = cx.base();
         tilted(cx, |r, k, axis| {
             let span = cx.data.span(k);
             let carried = Carried {
@@ -96,9 +94,8 @@ impl Effect for BaseCompliance {
         } = e;
         let omega = 2.0 * std::f64::consts::PI * shape[0];
         let soft = |axis: usize| {
-            let mass = cx.base().map_or(1.0, |b| {
-                b.mass[axis].iter().sum::<f64>() / b.mass[axis].len() as f64
-            });
+            let mass = &cx.base().mass[axis];
+            let mass = mass.iter().sum::<f64>() / mass.len() as f64;
             1.0 / (mass * omega * omega)
         };
         vec![
@@ -183,8 +180,8 @@ pub struct Load {
 }
 
 impl Load {
-    /// Of the nominal model; `None` for robots that are not serial.
-    pub fn of(cx: &Context) -> Option<Self> {
+    /// Of the nominal model of a serial or tree robot.
+    pub fn of(cx: &Context) -> Self {
         let robot = cx.data.plant.robot();
         let tree = crate::dynamics::Tree::new(&on_joints(robot));
         let mut out = Load {
@@ -212,7 +209,7 @@ impl Load {
                 out.mass[k].extend(pairs.map(|(a, b)| a - b));
             }
         }
-        Some(out)
+        out
     }
 }
 

@@ -33,7 +33,7 @@ pub struct Context<'a> {
     /// how the torque of each joint changes with its position and velocity, once it was asked for (serial robots)
     slopes: Vec<OnceLock<[Vec<f64>; 2]>>,
     /// what the robot exerts on its base, once it was asked for
-    base: OnceLock<Option<base_compliance::Load>>,
+    base: OnceLock<base_compliance::Load>,
     /// what other geometry changes, once it was asked for
     deformations: OnceLock<Option<Deformations>>,
 }
@@ -103,10 +103,8 @@ impl<'a> Context<'a> {
     }
 
     /// What the robot exerts on its base (serial robots).
-    pub(crate) fn base(&self) -> Option<&base_compliance::Load> {
-        self.base
-            .get_or_init(|| base_compliance::Load::of(self))
-            .as_ref()
+    pub(crate) fn base(&self) -> &base_compliance::Load {
+        self.base.get_or_init(|| base_compliance::Load::of(self))
     }
 
     /// What deviations of the legs change (hexapods).

@@ -71,12 +71,8 @@ impl Effect for Payload {
             phi[10 * body + k] = 1.0;
             closed_column(cx, &phi)
         };
-        match column(0) {
-            Some(first) => std::iter::once(first)
-                .chain((1..count).map_while(column))
-                .collect(),
-            None => link_inertia::body_columns(cx, body, count),
-        }
+        let all: Option<Vec<Column>> = (0..count).map(column).collect();
+        all.unwrap_or_else(|| link_inertia::body_columns(cx, body, count))
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
