@@ -178,6 +178,8 @@ warning_kinds! {
     LogSuspect = "log_suspect",
     /// Measured poses contradict the geometry of the robot file by more than their noise.
     PoseContradicts = "pose_contradicts",
+    /// What a fit leaves looks like joints of the legs that are not where the robot file says.
+    GeometrySuspect = "geometry_suspect",
     /// A joint does not move in a log.
     JointNotMoving = "joint_not_moving",
     /// The stated period does not hold, or is too short or too long for the record.

@@ -101,6 +101,7 @@ pub fn json(found: &Identified) -> Value {
             })
         })
         .collect();
+    out["geometry_std"] = json!(one.geometry);
     out["residual_spread"] = json!(one.spreads);
     out["zeros"] = found
         .joints

@@ -1,6 +1,7 @@
 //! All parameters of the load at once, by weighted least squares over the actuators.
 
 mod fitted;
+mod geometry;
 mod reweight;
 mod solver;
 mod spectrum;
@@ -8,6 +9,7 @@ mod stream;
 mod ten;
 mod zeros;
 
+use self::reweight::Fit;
 pub(super) use fitted::rms;
 pub use fitted::{Fitted, JointFriction};
 pub(super) use solver::Solver;
@@ -42,6 +44,9 @@ pub struct OneStep {
     /// what the empty platform of a closed chain deviates by from the robot file, ten parameters about its origin; `None`
     /// without a record of it, and of a serial robot
     pub platform: Option<[f64; 10]>,
+    /// standard deviation of the coordinates of the legs' joints and of their lengths from the robot file, m, where the
+    /// records show one: the estimate counts them as unknowns
+    pub geometry: Option<f64>,
     /// constant forces of the actuators: shared by the records, drifting or free; empty with a single record
     pub zeros: Vec<Decision>,
     /// the load as it became known, block by block of the loaded records
@@ -73,10 +78,19 @@ pub fn estimate(
         true => suspicion::prepared(plant, tool, &system)?,
         false => Vec::new(),
     };
-    let mut solver = Solver::new(&system, ten::unknowns(&system, settings.parameters)?);
+    let unknowns = ten::unknowns(&system, settings.parameters)?;
     let noise = reweight::first_noise(plant, &system);
-    let (solution, spreads) = reweight::reweighted(&mut solver, &noise, settings)?;
-    let (mut solution, mut all) = reweight::completed(&mut solver, solution, &spreads, settings)?;
+    let fit = |geometry| {
+        let mut solver = Solver::new(&system, unknowns.clone());
+        solver.geometry = geometry;
+        Fit::new(solver, &noise, settings)
+    };
+    let Fit {
+        solver,
+        mut solution,
+        covariance: mut all,
+        spreads,
+    } = geometry::refined(plant, fit(None)?, &fit)?;
     let zeros = zeros::decide(&solver, &mut solution, &mut all);
     let (mut phi, covariance) = ten::values(&solver, &solution, &all);
     let (mut known, mut unknown) = ten::known(&system);
@@ -97,6 +111,7 @@ pub fn estimate(
     Ok(OneStep {
         warnings: suspicions
             .into_iter()
+            .chain(geometry::warning(&solver))
             .chain(warnings(
                 &load,
                 full && known.iter().all(|k| *k),
@@ -108,6 +123,7 @@ pub fn estimate(
             .map(|p| fitted::fitted(&solver, &solution, &all, &load, p))
             .collect(),
         platform: (empty && of_platform(plant)).then(|| ten::platform(&system, &solution)),
+        geometry: solver.geometry.as_ref().map(|g| g.spread),
         zeros,
         stream,
         load,

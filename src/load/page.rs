@@ -229,7 +229,16 @@ fn methods(found: &Identified) -> Section {
         p {
             "Centre of mass and tensor in the frame of " (found.frame) ", the tensor about the centre of \
              mass. ± is the 95 % interval: it counts noise, friction and constant forces, and gains where a known \
-             load tells them. A geometry that is not that of the robot file is not in it. Differences of the tensor \
+             load tells them. "
+            (match found.one_step.geometry {
+                Some(off) => format!(
+                    "It counts joints of the legs that are not where the robot file says, by {} mm (standard deviation): what \
+                     the model leaves of the forces looks like that. ",
+                    significant(1e3 * off, 1)
+                ),
+                None => "A geometry that is not that of the robot file is not in it. ".to_string(),
+            })
+            "Differences of the tensor \
              are relative to the geometric mean of the moments of its row and column."
         }
         @match two {

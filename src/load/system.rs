@@ -50,6 +50,14 @@ pub struct Part {
 }
 
 impl Part {
+    /// Mean time from sample to sample, s; 0 of a single one.
+    pub fn step(&self) -> f64 {
+        match self.time.as_slice() {
+            [first, .., last] => (last - first) / (self.time.len() - 1) as f64,
+            _ => 0.0,
+        }
+    }
+
     /// Cut-off of the filter that torques and columns passed, Hz.
     pub fn cutoff(&self) -> f64 {
         self.filter.cutoff

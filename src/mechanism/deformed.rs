@@ -19,6 +19,8 @@ use std::sync::Arc;
 const STEP: f64 = 1e-5;
 /// Steps of Newton's method from the pose of the nominal geometry: the second is below rounding.
 const NEWTON: usize = 2;
+/// Samples a second that a change of the geometry is computed at. It follows the motion and has no reversals.
+const RATE: f64 = 60.0;
 
 impl Mechanism {
     /// How many deviations of its legs [`Mechanism::deformations`] knows: [`LEG`] of each, none for other mechanisms.
@@ -30,14 +32,25 @@ impl Mechanism {
     }
 
     /// Change of the actuator forces per unit of each deviation, in the order of [`LEG`], leg after leg: entry `a·count + s`
-    /// for actuator `a` and sample `s`, N/m. `bodies` are the inertial parameters of all bodies of the tree.
+    /// for actuator `a` and sample `s`, N/m. `bodies` are the inertial parameters of all bodies of the tree, `dt` is the
+    /// time from sample to sample, s: the change is computed at 60 samples a second and at the last, cubics join them.
     ///
     /// # Errors
     /// Poses that cannot be reached.
-    pub(crate) fn deformations(&self, x: &Samples, bodies: &[f64]) -> Result<Vec<Vec<f64>>> {
-        let nominal = self.motion(x)?;
+    pub(crate) fn deformations(
+        &self,
+        x: &Samples,
+        dt: f64,
+        bodies: &[f64],
+    ) -> Result<Vec<Vec<f64>>> {
+        if x.count == 0 {
+            return Ok(vec![Vec::new(); self.deviations()]);
+        }
+        let every = ((1.0 / (RATE * dt)) as usize).clamp(1, x.count);
+        let thin = thinned(x, every);
+        let nominal = self.motion(&thin)?;
         let read = |of: &[f64]| -> Vec<Vec<f64>> {
-            let row = |j: &usize| of[j * x.count..(j + 1) * x.count].to_vec();
+            let row = |j: &usize| of[j * thin.count..(j + 1) * thin.count].to_vec();
             self.actuated.iter().map(row).collect()
         };
         let actuators = [&nominal.tree.q, &nominal.tree.qd, &nominal.tree.qdd].map(|of| read(of));
@@ -47,11 +60,16 @@ impl Mechanism {
             let side = |step: f64| {
                 let mut shift = [0.0; 7];
                 shift[k % parts] = step;
-                self.deformed(x, &actuators, k / parts, &shift, bodies)
+                self.deformed(&thin, &actuators, k / parts, &shift, bodies)
             };
             let (plus, minus) = (side(STEP)?, side(-STEP)?);
             let pairs = plus.iter().zip(&minus);
-            all.push(pairs.map(|(p, m)| (p - m) / (2.0 * STEP)).collect());
+            let change: Vec<f64> = pairs.map(|(p, m)| (p - m) / (2.0 * STEP)).collect();
+            let mut dense = Vec::with_capacity(self.actuators() * x.count);
+            for row in change.chunks_exact(thin.count) {
+                between(row, every, x.count, &mut dense);
+            }
+            all.push(dense);
         }
         Ok(all)
     }
@@ -113,5 +131,60 @@ impl Mechanism {
         let mut all = Vec::new();
         self.tree_phi(&self.parameters.expand(phi), true, &mut all);
         all
+    }
+}
+
+/// Every `every`-th sample, and the last.
+fn thinned(x: &Samples, every: usize) -> Samples {
+    let points = (x.count - 1).div_ceil(every) + 1;
+    let mut out = Samples::zeros(x.dof, points);
+    let all = [
+        (&mut out.q, &x.q),
+        (&mut out.qd, &x.qd),
+        (&mut out.qdd, &x.qdd),
+    ];
+    for (to, from) in all {
+        for c in 0..x.dof {
+            for i in 0..points {
+                to[c * points + i] = from[c * x.count + (i * every).min(x.count - 1)];
+            }
+        }
+    }
+    out
+}
+
+/// Values at every `every`-th sample and at the last, at all of `count`: cubics with the slopes of their neighbours.
+fn between(values: &[f64], every: usize, count: usize, out: &mut Vec<f64>) {
+    let last = values.len() - 1;
+    let time = |i: usize| (i * every).min(count - 1) as f64;
+    let slope = |i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+        (values[b] - values[a]) / (time(b) - time(a)).max(1.0)
+    };
+    for s in 0..count {
+        let i = (s / every).min(last.saturating_sub(1));
+        let (a, b) = (i, (i + 1).min(last));
+        let width = (time(b) - time(a)).max(1.0);
+        let u = (s as f64 - time(a)) / width;
+        let (v, w) = (u * u, u * u * u);
+        let ends = (2.0 * w - 3.0 * v + 1.0) * values[a] + (3.0 * v - 2.0 * w) * values[b];
+        let tangents = (w - 2.0 * v + u) * slope(a) + (w - v) * slope(b);
+        out.push(ends + width * tangents);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cubics_follow_a_smooth_signal() {
+        let f = |t: f64| (0.05 * t).sin();
+        let coarse: Vec<f64> = (0..=50).map(|i| f((4 * i).min(199) as f64)).collect();
+        let mut fine = Vec::new();
+        between(&coarse, 4, 200, &mut fine);
+        let worst = fine.iter().enumerate();
+        let worst = worst.fold(0.0f64, |m, (t, v)| m.max((v - f(t as f64)).abs()));
+        assert!(fine.len() == 200 && worst < 1e-3, "{worst}");
     }
 }

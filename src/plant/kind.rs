@@ -38,13 +38,14 @@ impl Plant {
     }
 
     /// Change of the actuator forces per unit of each of [`Plant::deviations`], with these values of the unknowns and this
-    /// load in the body that carries one; empty where there are none.
+    /// load in the body that carries one; empty where there are none. `dt` is the time from sample to sample, s.
     ///
     /// # Errors
     /// Poses that cannot be reached.
     pub(crate) fn deformations(
         &self,
         x: &Samples,
+        dt: f64,
         phi: &[f64],
         load: Option<&[f64; 10]>,
     ) -> Result<Vec<Vec<f64>>> {
@@ -56,7 +57,7 @@ impl Plant {
             let body = bodies[10 * tool..].iter_mut();
             body.zip(load).for_each(|(b, l)| *b += l);
         }
-        mechanism.deformations(x, &bodies)
+        mechanism.deformations(x, dt, &bodies)
     }
 
     /// Actuator forces that stand for generalised forces of the joints of the tree, `Gᵀ Γ`, actuator-major; `None` of a

@@ -1,6 +1,7 @@
 //! Loads from logs of the drives: exact where there is no noise, within the stated bounds with
 //! residual friction and noise.
 
+mod legs;
 mod reference;
 mod told;
 

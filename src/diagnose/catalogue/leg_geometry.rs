@@ -13,8 +13,6 @@ const SPREAD: f64 = 2e-3;
 const SEEN: f64 = 9.0;
 /// No joint is off by more, m.
 const MOST: f64 = 0.02;
-/// Samples a second that a change of the geometry is computed at. It follows the motion and has no reversals.
-const RATE: f64 = 60.0;
 
 macro_rules! names {
     ($leg:literal) => {
@@ -169,27 +167,11 @@ impl Deformations {
         let known = &cx.phi[..data.plant.parameters().len()];
         let mut columns = vec![vec![Vec::with_capacity(data.rows()); n]; count];
         for (k, r) in data.records.iter().enumerate() {
-            let every = ((1.0 / (RATE * r.dt)) as usize).max(1);
-            let points = (r.count - 1).div_ceil(every) + 1;
-            let at = |i: usize| (i * every).min(r.count - 1);
-            let mut x = Samples::zeros(r.x.dof, points);
-            for (to, from) in [
-                (&mut x.q, &r.x.q),
-                (&mut x.qd, &r.x.qd),
-                (&mut x.qdd, &r.x.qdd),
-            ] {
-                for c in 0..r.x.dof {
-                    for i in 0..points {
-                        to[c * points + i] = from[c * r.count + at(i)];
-                    }
-                }
-            }
             let load = data.load(k, &cx.phi);
-            let changes = data.plant.deformations(&x, known, load.as_ref()).ok()?;
-            for (column, change) in columns.iter_mut().zip(changes) {
-                for (row, values) in column.iter_mut().zip(change.chunks_exact(points)) {
-                    let scaled: Vec<f64> = values.iter().map(|v| SPREAD * v).collect();
-                    between(&scaled, every, r.count, row);
+            let changes = data.plant.deformations(&r.x, r.dt, known, load.as_ref());
+            for (column, change) in columns.iter_mut().zip(changes.ok()?) {
+                for (row, values) in column.iter_mut().zip(change.chunks_exact(r.count)) {
+                    row.extend(values.iter().map(|v| SPREAD * v));
                 }
             }
         }
@@ -239,26 +221,6 @@ impl Deformations {
     }
 }
 
-/// Values at every `every`-th sample and at the last, at all of `count`: cubics with the slopes of their neighbours.
-fn between(values: &[f64], every: usize, count: usize, out: &mut Vec<f64>) {
-    let last = values.len() - 1;
-    let time = |i: usize| (i * every).min(count - 1) as f64;
-    let slope = |i: usize| {
-        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
-        (values[b] - values[a]) / (time(b) - time(a)).max(1.0)
-    };
-    for s in 0..count {
-        let i = (s / every).min(last.saturating_sub(1));
-        let (a, b) = (i, (i + 1).min(last));
-        let width = (time(b) - time(a)).max(1.0);
-        let u = (s as f64 - time(a)) / width;
-        let (v, w) = (u * u, u * u * u);
-        let ends = (2.0 * w - 3.0 * v + 1.0) * values[a] + (3.0 * v - 2.0 * w) * values[b];
-        let tangents = (w - 2.0 * v + u) * slope(a) + (w - v) * slope(b);
-        out.push(ends + width * tangents);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -299,7 +261,7 @@ mod tests {
             }
         }
         let bodies = mechanism.bodies_with(&plant.values());
-        let columns = mechanism.deformations(&x, &bodies).unwrap();
+        let columns = mechanism.deformations(&x, 0.01, &bodies).unwrap();
         let before = plant.rigid_torque(&x, &plant.values()).unwrap();
         let actuators = plant.actuator_motion(&x).unwrap();
         for (off, k) in [([1e-4, 0.0], 0), ([0.0, 1e-4], 3)] {
@@ -315,16 +277,5 @@ mod tests {
             }
             assert!(wrong < 1e-4 * size, "{k}: {} of it", (wrong / size).sqrt());
         }
-    }
-
-    #[test]
-    fn cubics_follow_a_smooth_signal() {
-        let f = |t: f64| (0.05 * t).sin();
-        let coarse: Vec<f64> = (0..=50).map(|i| f((4 * i).min(199) as f64)).collect();
-        let mut fine = Vec::new();
-        between(&coarse, 4, 200, &mut fine);
-        let worst = fine.iter().enumerate();
-        let worst = worst.fold(0.0f64, |m, (t, v)| m.max((v - f(t as f64)).abs()));
-        assert!(fine.len() == 200 && worst < 1e-3, "{worst}");
     }
 }

@@ -117,6 +117,7 @@ pub fn fitted(
                 for f in 0..3 {
                     carried[i] -= values[f] * part.friction[f][i];
                 }
+                carried[i] -= solver.geometry_at(&s.values, p, i);
                 carried[i] -= values[3] * solver.peaks[p][i] + speed * solver.slopes[p][i];
             }
             let (mut coulomb, mut viscous) = (Vec::new(), Vec::new());

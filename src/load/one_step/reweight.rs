@@ -33,6 +33,47 @@ pub fn first_noise(plant: &Plant, system: &System) -> Vec<f64> {
         .collect()
 }
 
+/// Share of the torque below which what is left of it is rounding.
+const EXACT: f64 = 1e-9;
+
+/// A fit: what was solved, with which spreads, and what it gave.
+pub struct Fit<'a> {
+    pub solver: Solver<'a>,
+    pub solution: Solution,
+    pub covariance: Mat<f64>,
+    pub spreads: Vec<Spread>,
+}
+
+impl<'a> Fit<'a> {
+    /// Weights until they settle, then the Stribeck speeds with all else.
+    ///
+    /// # Errors
+    /// Signals that are not finite.
+    pub fn new(mut solver: Solver<'a>, noise: &[f64], settings: &Settings) -> Result<Self> {
+        let (solution, spreads) = reweighted(&mut solver, noise, settings)?;
+        let (solution, covariance) = completed(&mut solver, solution, &spreads, settings)?;
+        Ok(Fit {
+            solver,
+            solution,
+            covariance,
+            spreads,
+        })
+    }
+
+    /// Whether what is left is rounding: no sensor is that good.
+    pub fn exact(&self) -> bool {
+        let parts = &self.solver.system.parts;
+        let left = parts.iter().zip(&self.solution.residual);
+        left.into_iter()
+            .all(|(part, left)| rms(left) <= EXACT * rms(&part.torque))
+    }
+
+    /// Standard deviation of row `i` of record `p`.
+    pub fn deviation(&self, p: usize, i: usize) -> f64 {
+        deviation(self.solver.system, &self.spreads, p, i)
+    }
+}
+
 /// Standard deviation of row `i` of record `p`.
 fn deviation(system: &System, spreads: &[Spread], p: usize, i: usize) -> f64 {
     let part = &system.parts[p];
@@ -56,7 +97,7 @@ fn spread(system: &System, s: &Solution, a: usize, least: f64, weighted: bool) -
 ///
 /// # Errors
 /// Signals that are not finite.
-pub fn reweighted(
+fn reweighted(
     solver: &mut Solver,
     noise: &[f64],
     settings: &Settings,
@@ -101,7 +142,7 @@ const STICKING: f64 = 2.0;
 ///
 /// # Errors
 /// Signals that are not finite.
-pub fn completed(
+fn completed(
     solver: &mut Solver,
     first: Solution,
     spreads: &[Spread],

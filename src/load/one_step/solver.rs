@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::load::system::{Part, System};
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
+use nalgebra::{DMatrix, DVector};
 
 /// Values of all columns, and what they leave.
 pub struct Solution {
@@ -15,6 +16,14 @@ pub struct Solution {
     pub residual: Vec<Vec<f64>>,
     /// triangular factor of the weighted columns
     pub r: Mat<f64>,
+}
+
+/// Deviations of the legs that are unknowns.
+pub struct Geometry {
+    /// their columns, record by record
+    pub columns: Vec<Mat<f64>>,
+    /// standard deviation of each before the records are seen, m
+    pub spread: f64,
 }
 
 /// The system with weights.
@@ -33,6 +42,8 @@ pub struct Solver<'a> {
     pub slopes: Vec<Vec<f64>>,
     /// standard deviation of the Stribeck forces of each actuator before the records are seen, N m or N
     pub breakaway: Vec<f64>,
+    /// deviations of the legs, where the records show them
+    pub geometry: Option<Geometry>,
 }
 
 /// Friction columns of an actuator in a record: Coulomb, viscous, offset, Stribeck.
@@ -51,10 +62,17 @@ impl<'a> Solver<'a> {
             peaks: system.parts.iter().map(|p| vec![0.0; p.y.len()]).collect(),
             slopes: system.parts.iter().map(|p| vec![0.0; p.y.len()]).collect(),
             breakaway: vec![f64::INFINITY; system.actuators],
+            geometry: None,
         }
     }
 
     fn columns(&self) -> usize {
+        let deviations = self.geometry.as_ref().map(|g| &g.columns[0]);
+        self.first_deviation() + deviations.map_or(0, |c| c.ncols())
+    }
+
+    /// Column of the first deviation of the legs.
+    fn first_deviation(&self) -> usize {
         self.speed(self.system.actuators)
     }
 
@@ -90,6 +108,11 @@ impl<'a> Solver<'a> {
         }
         to(first + 3, self.peaks[p][i]);
         to(self.speed(i / part.count), self.slopes[p][i]);
+        if let Some(g) = &self.geometry {
+            for c in 0..g.columns[p].ncols() {
+                to(self.first_deviation() + c, g.columns[p][(i, c)]);
+            }
+        }
     }
 
     /// Looks for Stribeck friction in the residuals of every actuator; `sigma` are their standard
@@ -283,6 +306,57 @@ impl<'a> Solver<'a> {
         Ok(self.solve_with(deviation, true)?.2)
     }
 
+    /// What the residual of the fit tells of other columns, those of each record: `G⊥ᵀ S⁻¹ G⊥` and `G⊥ᵀ S⁻¹ e`, where the fit
+    /// has taken its own out of them. Of the power over frequency `S`.
+    ///
+    /// # Errors
+    /// Signals that are not finite.
+    pub fn beside(
+        &self,
+        deviation: &dyn Fn(usize, usize) -> f64,
+        others: &[Mat<f64>],
+        power: &[Vec<f64>],
+    ) -> Result<(DMatrix<f64>, DVector<f64>)> {
+        let (a, y) = self.rows(deviation, true);
+        let rows = self.system.parts.iter().map(|p| p.y.len()).sum();
+        let mut all = Mat::<f64>::zeros(a.nrows(), others[0].ncols() + 1);
+        let mut r = 0;
+        for (p, part) in self.system.parts.iter().enumerate() {
+            for i in 0..part.y.len() {
+                let w = 1.0 / deviation(p, i);
+                for c in 0..others[p].ncols() {
+                    all[(r, c)] = w * others[p][(i, c)];
+                }
+                r += 1;
+            }
+        }
+        self.turn(&mut all);
+        let last = all.ncols() - 1;
+        for r in 0..y.nrows() {
+            all[(r, last)] = y[(r, 0)];
+        }
+        let q = a.qr().compute_thin_Q();
+        let taken = q.transpose() * &all;
+        all -= &q * taken;
+        let roots = power.iter().flatten().map(|s| s.sqrt());
+        for (r, root) in (0..rows).zip(roots) {
+            for c in 0..=last {
+                all[(r, c)] /= root;
+            }
+        }
+        let rows = all.subrows(0, rows);
+        let gram = rows.transpose() * rows;
+        if (0..=last).any(|c| !gram[(c, c)].is_finite()) {
+            return Err(Error::Infeasible(
+                "what a change of the geometry does to the forces is not finite".into(),
+            ));
+        }
+        Ok((
+            DMatrix::from_fn(last, last, |i, k| gram[(i, k)]),
+            DVector::from_fn(last, |i, _| gram[(i, last)]),
+        ))
+    }
+
     /// What the unweighted fit makes of other torques, one set a column: values of all columns.
     pub fn respond(&self, torques: &Mat<f64>) -> Mat<f64> {
         let (a, _) = self.rows(&|_, _| 1.0, false);
@@ -314,6 +388,9 @@ impl<'a> Solver<'a> {
                 let c = self.friction(p) + EACH * k + 3;
                 out[c] = out[c].max(1.0 / force);
             }
+        }
+        if let Some(g) = &self.geometry {
+            out[self.first_deviation()..].fill(1.0 / g.spread);
         }
         out
     }
@@ -407,6 +484,13 @@ impl<'a> Solver<'a> {
         let three = part.friction.iter().enumerate();
         let three: f64 = three.map(|(f, column)| values[first + f] * column[i]).sum();
         three + values[first + 3] * self.peaks[p][i]
+    }
+
+    /// What the deviations of the legs make of row `i` of a record by these values.
+    pub fn geometry_at(&self, values: &[f64], p: usize, i: usize) -> f64 {
+        let Some(g) = &self.geometry else { return 0.0 };
+        let own = values[self.first_deviation()..].iter().enumerate();
+        own.map(|(c, v)| v * g.columns[p][(i, c)]).sum()
     }
 
     /// Their standard deviations, and that of the Stribeck speed, from the covariance of all columns.

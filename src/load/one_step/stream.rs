@@ -52,10 +52,7 @@ struct Block<'a> {
 }
 
 fn blocks(p: usize, part: &Part) -> Vec<Block<'_>> {
-    let step = match part.time.as_slice() {
-        [first, .., last] => (last - first) / (part.time.len() - 1) as f64,
-        _ => 0.0,
-    };
+    let step = part.step();
     if part.periods.len() > 1 {
         let variance = part.periods.len() as f64;
         return part
