@@ -131,7 +131,11 @@ fn excitation(a: &Assessment, e: &Excitation) -> String {
     ];
     let others = all.iter().filter(|(n, _)| *n != name);
     let others: Vec<String> = others.map(|(n, v)| format!("{n} {v:.3}")).collect();
-    let what = if a.mechanism { " of unit columns" } else { "" };
+    let what = if a.unit_columns() {
+        " of unit columns"
+    } else {
+        ""
+    };
     let _ = writeln!(
         out,
         "condition number{what} {headline:.3} ({})",

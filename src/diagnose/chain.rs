@@ -1,25 +1,27 @@
 //! What is done otherwise on a closed chain, each with its reason. Nothing else here asks for the kind of robot, but for the
-//! effects that only one kind has ([`Effect::robots`](super::catalogue::Effect::robots)).
+//! effects that only one kind has ([`Effect::robots`](super::catalogue::Effect::robots)), and these ask here.
 
 use super::data::Data;
+use super::thresholds::THRESHOLDS as T;
+use crate::plant::Plant;
 
 impl Data<'_> {
     /// Whether drives may stand at a reversal while others move on: rows near it have no weight then, and what lies in
     /// them is not looked at. The joints of a tree pass through zero at once.
     pub fn sticks(&self) -> bool {
-        closed(self)
+        closed(self.plant)
     }
 
     /// Whether a body anywhere may stand for the parameters of another, since one platform carries them all: rivals are then
     /// also weighed by what they leave of the residual.
     pub fn shared(&self) -> bool {
-        closed(self)
+        closed(self.plant)
     }
 
     /// Variance that periods differ by beyond the noise, of this one in units of the noise: the excess of a tree's noise
     /// holds it already.
     pub fn differing(&self, variance: f64) -> f64 {
-        match closed(self) {
+        match closed(self.plant) {
             true => (variance - 1.0).max(0.0),
             false => 0.0,
         }
@@ -27,10 +29,23 @@ impl Data<'_> {
 
     /// Whether the lead of a simulator's friction is looked for: it was seen on joints of trees alone.
     pub fn may_lead(&self) -> bool {
-        !closed(self)
+        !closed(self.plant)
     }
 }
 
-fn closed(data: &Data) -> bool {
-    data.plant.closed()
+/// Whether the links of legs have common axes, so that parameters of one stand for those of all: not of general closed
+/// chains.
+pub fn legs_alike(plant: &Plant) -> bool {
+    !plant.looped()
+}
+
+/// How many harmonics the designs of the next motion have; `None`: no designs, since following loops in every step of the
+/// optimiser takes minutes.
+pub fn harmonics(plant: &Plant) -> Option<usize> {
+    let each = T.motions.harmonics[usize::from(closed(plant))];
+    legs_alike(plant).then_some(each)
+}
+
+pub(super) fn closed(plant: &Plant) -> bool {
+    plant.closed()
 }

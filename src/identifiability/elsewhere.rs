@@ -27,8 +27,7 @@ impl TorqueUncertainty {
     /// Of parameters with a covariance.
     pub(super) fn of(plant: &Plant, base: &BaseParameters, covariance: &Mat<f64>) -> Result<Self> {
         // series of the actuators follow a platform from one sample to the next: its poses are drawn
-        let platform = plant.by_platform();
-        let plant = platform.as_ref().unwrap_or(plant);
+        let plant = plant.by_platform();
         let states = plant.random_states(STATES, SEED);
         let rows = base.select(plant.regressor(&states)?.as_ref());
         let torque = plant.nominal_torque(&states)?;

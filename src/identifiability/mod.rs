@@ -37,7 +37,7 @@ pub(crate) use platform::Platform;
 pub(crate) use spread::Spread;
 
 use crate::base::BaseParameters;
-use crate::design::{Question, Settings};
+use crate::design::{Condition, Question, Settings};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
@@ -101,8 +101,8 @@ pub struct Assessment {
     pub base: BaseParameters,
     /// nominal values of the standard parameters
     pub values: Vec<f64>,
-    /// whether it is a parallel robot
-    pub mechanism: bool,
+    /// the condition number that stands for all, where a single one is printed
+    pub headline: Condition,
     /// torque noise used, per joint
     pub torque_noise: Vec<f64>,
     /// the trajectory, where one was given
@@ -137,14 +137,19 @@ impl Assessment {
         settings.is_some_and(|s| s["for"] == "load")
     }
 
-    /// The condition number that stands for all, where a single one is printed: of the columns as they are for a tree; of
-    /// unit columns for a closed chain, whose parameters differ by orders of magnitude in size. With its name.
+    /// The condition number that stands for all, where a single one is printed, with its name: that of
+    /// [`Assessment::headline`].
     pub fn condition(&self) -> Option<(&'static str, f64)> {
         let c = &self.excitation.as_ref()?.condition;
-        Some(match self.mechanism {
+        Some(match self.unit_columns() {
             true => ("normalised", c.normalised),
             false => ("invariant", c.invariant),
         })
+    }
+
+    /// Whether the condition number that stands for all is that of unit columns.
+    pub(crate) fn unit_columns(&self) -> bool {
+        self.headline == Condition::Normalised
     }
 }
 
@@ -205,8 +210,8 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         (Some(m), Some(c)) => Some(Platform::of(m, &motion, c)?),
         _ => None,
     };
-    all.warnings
-        .extend(unexcited(&condition, platform.is_some()));
+    let unit_columns = all.unit_columns();
+    all.warnings.extend(unexcited(&condition, unit_columns));
     all.warnings.extend(hardly_moved::warning(
         &certified.actuators,
         &plant.actuators(),
@@ -257,7 +262,7 @@ fn alone(plant: &Plant) -> Result<Assessment> {
     Ok(Assessment {
         warnings: known.chain(more).collect(),
         values: plant.values(),
-        mechanism: plant.closed(),
+        headline: Condition::usual(plant),
         robot: plant.actuator_robot(),
         base,
         torque_noise,
@@ -267,10 +272,9 @@ fn alone(plant: &Plant) -> Result<Assessment> {
     })
 }
 
-/// A warning where the motion leaves base parameters out. Parameters of a closed chain differ by many
-/// orders of magnitude in size, so unit columns decide there.
-fn unexcited(condition: &ConditionNumbers, platform: bool) -> Option<Warning> {
-    let (number, most, how) = match platform {
+/// A warning where the motion leaves base parameters out, by the condition number that stands for all.
+fn unexcited(condition: &ConditionNumbers, unit_columns: bool) -> Option<Warning> {
+    let (number, most, how) = match unit_columns {
         false => (condition.invariant, 1e7, ""),
         true => (condition.normalised, 1e6, " with unit columns"),
     };

@@ -49,11 +49,7 @@ pub fn html(assessment: &Assessment, record: Option<&Record>) -> String {
             "the robot alone, without a trajectory".to_string(),
         ),
     };
-    let joint = match assessment.mechanism {
-        true => "actuator",
-        false => "joint",
-    };
-    let line = format!("{}, {what}", count(robot.dof(), joint));
+    let line = format!("{}, {what}", count(robot.dof(), "actuated joint"));
     let mut sections = Vec::new();
     sections.extend(warnings(assessment));
     sections.push(Section::new("", tiles(assessment)));
@@ -155,7 +151,7 @@ fn tiles(a: &Assessment) -> Markup {
         (
             significant(a.condition().map_or(f64::INFINITY, |c| c.1), 3),
             "condition number".to_string(),
-            match a.mechanism {
+            match a.unit_columns() {
                 true => "columns scaled to unit length".to_string(),
                 false => "independent of the choice of base parameters".to_string(),
             },

@@ -126,14 +126,15 @@ fn carrying(plant: &Plant, body: usize) -> Option<String> {
 
 /// Joints without an unknown rotor whose residual goes with their acceleration.
 fn missing(plant: &Plant, traces: &[Trace]) -> Vec<Warning> {
-    // the inertia of a rotor cannot be told from that of the legs
-    if plant.closed() {
-        return Vec::new();
-    }
     let armature = JointTerm::Armature as usize;
     let joints = plant.actuators();
+    // the inertia of a rotor cannot be told from that of legs which other drives move, too
+    let bodies = 0..plant.robot().bodies.len();
+    let alone: Vec<usize> = bodies.filter_map(|b| plant.driver(b)).collect();
+    let moves = |a: &usize| alone.contains(&plant.actuated()[*a]);
     let without = (0..joints.len()).filter(|a| !joints[*a].identify[armature]);
     without
+        .filter(moves)
         .filter_map(|a| {
             let share = goes_with_acceleration(traces, a)?;
             (share > ARMATURE).then(|| {

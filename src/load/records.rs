@@ -17,10 +17,10 @@ pub struct Loaded {
     pub exchanged: Option<Vec<f64>>,
 }
 
-/// Whether a platform carries the load, held by all drives together: what they lack or exchange can be told by the equations,
-/// and of the empty robot only the platform may deviate, since legs seldom do.
+/// Whether a platform carries the load: what its drives lack or exchange can be told by the equations, and of the empty robot
+/// only the platform may deviate, since legs seldom do.
 pub(super) fn of_platform(plant: &Plant) -> bool {
-    plant.closed()
+    plant.held_together()
 }
 
 /// The records of an experiment with their signals prepared.

@@ -32,6 +32,11 @@ impl Plant {
         alone.then(|| self.robot.bodies[body].coordinate)
     }
 
+    /// Whether all actuators together hold the body that carries a load: a platform.
+    pub(crate) fn held_together(&self) -> bool {
+        self.tool().is_some_and(|body| self.driver(body).is_none())
+    }
+
     /// How many numbers of its geometry may deviate, as the file states them; 0 where they are not known one by one.
     pub(crate) fn deviations(&self) -> usize {
         self.mechanism().map_or(0, |m| m.deviations())

@@ -41,6 +41,7 @@ use crate::mechanism::Mechanism;
 use crate::mechanism::dimensions::Dimensions;
 use crate::robot::{Joint, JointTerm, Prior, Robot};
 use crate::trajectory::Space;
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 /// A robot: a tree, its actuated joints, its unknowns, and what closes it. See the
@@ -254,10 +255,12 @@ impl Plant {
         self.moved.joint_names()
     }
 
-    /// A parallel robot with the pose of its platform as coordinates, whatever its series are of. `None`: nothing closes
-    /// this robot.
-    pub(crate) fn by_platform(&self) -> Option<Plant> {
-        self.mechanism().map(|m| Plant::from(m.platform().clone()))
+    /// A parallel robot with the pose of its platform as coordinates, whatever its series are of; any other as it is.
+    pub(crate) fn by_platform(&self) -> Cow<'_, Plant> {
+        match self.mechanism() {
+            Some(m) => Cow::Owned(m.platform().into()),
+            None => Cow::Borrowed(self),
+        }
     }
 
     /// Dimensions of a mechanism that has any.

@@ -61,7 +61,8 @@ fn look(
         return;
     };
     let n = plant.actuators().len();
-    if plant.mechanism().is_some() || n == 0 || n > 8 || frame.time.is_none() {
+    let shared = (0..plant.robot().bodies.len()).any(|b| plant.driver(b).is_none());
+    if shared || n == 0 || n > 8 || frame.time.is_none() {
         return;
     }
     let smooth = Smooth::new(frame, CUTOFF);

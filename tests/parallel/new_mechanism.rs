@@ -234,7 +234,8 @@ fn it_is_judged_and_designed_like_those_that_come_with_the_program() {
     let design = design(&Plant::from(&m), &settings).unwrap();
     let plant = Plant::from(m);
     let alone = assess(&plant, None).unwrap();
-    assert!(alone.mechanism && alone.base.count() == base.count());
+    assert_eq!(alone.headline, Condition::Normalised);
+    assert_eq!(alone.base.count(), base.count());
     let a = assess(&plant, Some(&design.trajectory)).unwrap();
     let e = a.excitation.unwrap();
     assert!(e.certificate.satisfied, "{:?}", e.certificate.worst);

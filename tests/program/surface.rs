@@ -107,3 +107,45 @@ fn results_are_serialised() {
     assert_eq!(of["certificate"]["satisfied"], true);
     assert_eq!(of["trajectory"], file);
 }
+
+/// One plant for every robot: outside of `plant` and `mechanism` few lines ask whether something closes it (`docs/design.md`
+/// says which and why).
+#[test]
+fn few_places_ask_for_the_kind_of_robot() {
+    fn rust_files(folder: &std::path::Path, out: &mut Vec<std::path::PathBuf>) {
+        for entry in std::fs::read_dir(folder).expect("read") {
+            let path = entry.expect("read").path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            match path.is_dir() {
+                true if !["plant", "mechanism", "tests"].contains(&name.as_str()) => {
+                    rust_files(&path, out);
+                }
+                false if name.ends_with(".rs") && !name.starts_with("tests") => out.push(path),
+                _ => {}
+            }
+        }
+    }
+    let mut files = Vec::new();
+    let src = concat!(env!("CARGO_MANIFEST_DIR"), "/src");
+    rust_files(std::path::Path::new(src), &mut files);
+    assert!(files.len() > 300, "{}", files.len());
+    let asks = [".mechanism()", ".closed()", ".looped()", ".space().is_"];
+    let places: Vec<String> = files
+        .iter()
+        .flat_map(|path| {
+            let text = std::fs::read_to_string(path).expect("read");
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            let lines = code.lines().map(str::trim).enumerate();
+            lines
+                .filter(|(_, l)| !l.starts_with("//") && asks.iter().any(|a| l.contains(a)))
+                .map(|(i, l)| format!("{}:{}: {l}", path.display(), i + 1))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(
+        (8..=15).contains(&places.len()),
+        "{} places:\n{}",
+        places.len(),
+        places.join("\n")
+    );
+}

@@ -84,8 +84,7 @@ const REVOLUTION: [&[usize]; 4] = [&[0], &[3], &[4, 7], &[9]];
 /// the nominal model; where some have no mass in it, only of those. Crosses of universal joints
 /// count as massless.
 fn unknowns(cx: &Context) -> Vec<Unknown> {
-    // the links of a general closed chain have no common axes
-    if cx.data.plant.looped() {
+    if !chain::legs_alike(cx.data.plant) {
         return Vec::new();
     }
     let stands = |body: usize| {

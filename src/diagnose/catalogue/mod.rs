@@ -44,6 +44,7 @@ mod viscous_friction;
 pub use context::Context;
 pub use estimate::{Estimate, Place, Quantity, Shape, Value};
 
+use super::chain;
 use super::column::Column;
 use super::thresholds::THRESHOLDS as T;
 use crate::dynamics::Samples;
@@ -88,7 +89,7 @@ impl Robots {
     fn hold(self, plant: &plant::Plant) -> bool {
         match self {
             Robots::All => true,
-            one => plant.closed() == (one == Robots::Closed),
+            one => chain::closed(plant) == (one == Robots::Closed),
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::design::diagnostic::Checker;
 use crate::design::{Settings as Design, design};
+use crate::diagnose::chain;
 use crate::diagnose::data::Data;
 use crate::diagnose::thresholds::THRESHOLDS as T;
 use crate::plant::Plant;
@@ -61,14 +62,13 @@ impl<'a> Motions<'a> {
 
     /// The program's own designs on two grids, each also slower.
     fn designed(&self, seed: u64) -> Vec<(Fourier, usize)> {
-        // following loops in every step of the optimiser takes minutes
-        if self.plant.looped() {
+        let Some(harmonics) = chain::harmonics(self.plant) else {
             return Vec::new();
-        }
+        };
         let grids = [Grid::Odd, Grid::Full].into_par_iter().enumerate();
         let designs = grids.with_max_len(1).filter_map(|(k, grid)| {
             let wanted = Design {
-                harmonics: T.motions.harmonics[usize::from(self.plant.closed())],
+                harmonics,
                 period: T.motions.period,
                 grid,
                 seed: seed + k as u64,
