@@ -16,6 +16,20 @@ impl Column {
         }
     }
 
+    /// The same with zeros outside of these rows.
+    pub fn within(&self, spans: &[std::ops::Range<usize>]) -> Self {
+        let rows = self.rows.iter().map(|(j, v)| {
+            let mut part = vec![0.0; v.len()];
+            for span in spans {
+                part[span.clone()].copy_from_slice(&v[span.clone()]);
+            }
+            (*j, part)
+        });
+        Column {
+            rows: rows.collect(),
+        }
+    }
+
     /// Values on an actuator.
     pub fn get(&self, joint: usize) -> Option<&[f64]> {
         self.rows

@@ -55,8 +55,8 @@ pub struct Data<'a> {
     pub range: Vec<[f64; 2]>,
     /// ten columns of a load on the rows of the records that carry one; empty where none does
     pub tool: Vec<Column>,
-    /// first of the ten parameters of an unknown load
-    pub free_load: Option<usize>,
+    /// first of the ten parameters of the unknown load of each record
+    pub free_load: Vec<Option<usize>>,
 }
 
 impl<'a> Data<'a> {
@@ -166,13 +166,13 @@ impl<'a> Data<'a> {
             noise: Vec::new(),
             weights: vec![vec![1.0; rows]; n],
             inertia: inertia(plant, &records[0])?,
+            free_load: vec![None; records.len()],
             records,
             window: 0.0,
             lead: 0.0,
             speed,
             range,
             tool: Vec::new(),
-            free_load: None,
         };
         data.coulomb();
         data.noise = match noise {

@@ -206,16 +206,30 @@ fn rivals(
     }
 }
 
-/// The load that some records carry, with what the fit beside the effects says of it.
+/// The loads that some records carry, with what the fit beside the effects says of them.
 pub fn carried(
     evidence: &Evidence,
     cx: &Context,
     phi: &[f64],
     load: &Carried,
     effects: &[Box<dyn Effect>],
+) -> Vec<Finding> {
+    let mut all: Vec<usize> = evidence.data.free_load.iter().flatten().copied().collect();
+    all.dedup();
+    let one = |at| one_load(evidence, cx, phi, load, effects, at);
+    all.into_iter().filter_map(one).collect()
+}
+
+/// That with its ten parameters from `at` on.
+fn one_load(
+    evidence: &Evidence,
+    cx: &Context,
+    phi: &[f64],
+    load: &Carried,
+    effects: &[Box<dyn Effect>],
+    at: usize,
 ) -> Option<Finding> {
     let data = evidence.data;
-    let at = data.free_load?;
     let effect = effects.iter().find(|e| e.card().name == "payload")?;
     let card = effect.card();
     let place = *effect.sites(cx).first()?;
@@ -229,8 +243,9 @@ pub fn carried(
     let mut of: Vec<(usize, String)> = data
         .records
         .iter()
-        .filter(|r| load.records.contains(&r.order))
-        .map(|r| (r.order, r.name.clone()))
+        .zip(&data.free_load)
+        .filter(|(r, own)| **own == Some(at) && load.records.contains(&r.order))
+        .map(|(r, _)| (r.order, r.name.clone()))
         .collect();
     of.sort();
     Some(Finding {

@@ -87,7 +87,9 @@ use catalogue::Context;
 use channel::Channel;
 use data::Data;
 use evidence::Evidence;
+use payload::Loads;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 #[doc(hidden)]
 /// Records ready for the diagnosis: noise, window of the torque channel, ordinary imperfections.
@@ -96,6 +98,11 @@ use rayon::prelude::*;
 /// No record to fit to, records that are too short or hold too few sound samples, a payload that cannot be
 /// honoured, poses that cannot be reached.
 pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
+    prepare_with(plant, logs, Loads::One)
+}
+
+/// The same with one unknown load, or one by record.
+fn prepare_with<'a>(plant: &'a Plant, logs: &[log::Record], loads: Loads) -> Result<Data<'a>> {
     if !logs.iter().any(|r| r.purpose == Purpose::Fit) {
         return Err(Error::Infeasible(
             "the experiment has no record with use = \"fit\"; name at least one".into(),
@@ -109,7 +116,7 @@ pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
         .collect::<Result<Vec<_>>>()?;
     let mut data = Data::new(plant, records)?;
     data.ordinary();
-    data.carry()?;
+    data.carry(loads)?;
     // what the log makes of a torque, then what the encoders cannot resolve
     for pass in 0..2 {
         let channel = Channel::of(&data);
@@ -164,12 +171,18 @@ pub fn of_logs(
 ) -> Result<Diagnosis> {
     progress("noise and nominal model");
     let mut data = prepare(plant, logs)?;
-    let carried = carried::find(&mut data)?;
-    let stated = carried.as_ref().map(|c| c.stated(logs));
-    let logs = stated.as_deref().unwrap_or(logs);
-    if stated.is_some() {
-        data = prepare(plant, logs)?;
+    let mut logs = Cow::Borrowed(logs);
+    let mut carried = carried::find(&mut data)?;
+    if let Some(found) = &carried {
+        logs = Cow::Owned(found.stated(&logs));
+        data = prepare_with(plant, &logs, found.loads)?;
     }
+    if let Some(found) = carried::remounted(&mut data)? {
+        logs = Cow::Owned(found.stated(&logs));
+        data = prepare_with(plant, &logs, found.loads)?;
+        carried.iter_mut().for_each(|c| c.loads = found.loads);
+    }
+    let logs = logs.as_ref();
     let effects = catalogue::all();
     closeness::tighten(&mut data, &effects)?;
     let data = data;

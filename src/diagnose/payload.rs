@@ -3,8 +3,9 @@
 //! A load is ten more parameters `π` of the body that carries it, so its torque is `Y_tool(x, ẋ, ẍ) π`.
 //! A load that is known is part of the nominal model of its records: mass and centre of mass as the
 //! experiment states them, a point mass where it states no inertia. Records with an unknown load share
-//! one load, whose ten parameters are free, with columns that are zero on the records of the empty
-//! robot. So both kinds of record are one robot, and no effect can stand in the place of the load.
+//! one load, or each has its own where the load was mounted again in between ([`super::carried`]). The ten parameters of each are
+//! free, with columns that are zero on all other records. So both kinds of record are one robot, and no effect can stand in
+//! the place of the load.
 
 use super::column::Column;
 use super::data::Data;
@@ -19,6 +20,15 @@ use nalgebra::Matrix3;
 
 /// Ten parameters of a load about the origin of the frame of the body that carries it.
 pub type Load = [f64; 10];
+
+/// How many unknown loads there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loads {
+    /// one, which all records with an unknown load carry
+    One,
+    /// one in each of these records
+    ByRecord,
+}
 
 /// Names of the free parameters.
 const NAMES: [&str; 10] = [
@@ -97,16 +107,17 @@ fn stated(payload: Payload) -> Option<Load> {
 }
 
 impl Data<'_> {
-    /// Takes the loads of the records in: torques of known ones, and free parameters of the unknown one.
+    /// Takes the loads of the records in: torques of known ones, and free parameters of the unknown one, or of one for
+    /// each record that carries one.
     ///
     /// # Errors
     /// Poses that cannot be reached.
-    pub fn carry(&mut self) -> Result<()> {
+    pub fn carry(&mut self, loads: Loads) -> Result<()> {
         let none = |r: &Series| r.payload == Payload::None;
         let Some(tool) = self.plant.tool().filter(|_| !self.records.iter().all(none)) else {
             return Ok(());
         };
-        let mut columns = self.load_columns(tool, |r| !none(r))?;
+        let columns = self.load_columns(tool, |r| !none(r))?;
         for k in 0..self.records.len() {
             let Some(load) = stated(self.records[k].payload) else {
                 continue;
@@ -125,13 +136,16 @@ impl Data<'_> {
                 rows: rows.iter().cloned().enumerate().collect(),
             })
             .collect();
-        let unknown = |k: usize| is_free(self.records[k].payload);
-        if (0..self.records.len()).any(unknown) {
-            for rows in columns.iter_mut().flatten() {
-                for k in (0..self.records.len()).filter(|k| !unknown(*k)) {
-                    rows[self.start[k]..self.start[k + 1]].fill(0.0);
-                }
-            }
+        let unknown: Vec<usize> = (0..self.records.len())
+            .filter(|k| is_free(self.records[*k].payload))
+            .collect();
+        let groups: Vec<Vec<usize>> = match loads {
+            _ if unknown.is_empty() => Vec::new(),
+            Loads::One => vec![unknown],
+            Loads::ByRecord => unknown.into_iter().map(|k| vec![k]).collect(),
+        };
+        for records in groups {
+            let spans: Vec<_> = records.iter().map(|k| self.span(*k)).collect();
             let bodies = self.plant.robot().bodies.iter();
             let mass: f64 = bodies.map(|b| b.inertia.mass()).sum();
             let size = |c: usize| {
@@ -142,15 +156,21 @@ impl Data<'_> {
                 };
                 mass.max(T.load.lightest) * T.load.lever.powi(moment)
             };
-            let free = NAMES.iter().zip(columns).enumerate();
-            let free = free.map(|(c, (name, rows))| {
-                let rows = rows.into_iter().enumerate().collect();
-                (*name, Column { rows }, size(c))
-            });
-            self.free_load = Some(self.parameters.len());
-            self.add_nuisances(&free.collect::<Vec<_>>());
+            let free = NAMES.iter().zip(&self.tool).enumerate();
+            let free = free.map(|(c, (name, column))| (*name, column.within(&spans), size(c)));
+            let free: Vec<_> = free.collect();
+            let at = self.parameters.len();
+            for k in records {
+                self.free_load[k] = Some(at);
+            }
+            self.add_nuisances(&free);
         }
         Ok(())
+    }
+
+    /// First of the parameters of unknown loads, which follow those of the robot.
+    pub fn first_free_load(&self) -> Option<usize> {
+        self.free_load.iter().flatten().copied().min()
     }
 
     /// Torques of the ten parameters of a load on body `tool`, by parameter and actuator, on the rows of the records
@@ -179,8 +199,8 @@ impl Data<'_> {
     /// Starts from the load that a fit has found in the place of none, so that the gap of the model as it
     /// is does not contain it.
     pub fn start_from_load(&mut self, phi: &[f64]) {
-        if let Some(at) = self.free_load {
-            let load = self.parameters[at..].iter_mut().zip(&phi[at..]);
+        for at in self.free_load.iter().flatten() {
+            let load = self.parameters[*at..].iter_mut().zip(&phi[*at..]);
             load.take(10).for_each(|(p, v)| p.value = *v);
         }
     }
@@ -190,20 +210,25 @@ impl Data<'_> {
         match self.records[k].payload {
             Payload::None => None,
             free if is_free(free) => {
-                let at = self.free_load?;
+                let at = self.free_load[k]?;
                 phi.get(at..at + 10)?.try_into().ok()
             }
             known => stated(known),
         }
     }
 
-    /// The unknown load of a fit, in words.
-    pub fn free_load_in_words(&self, phi: &[f64]) -> Option<String> {
-        let at = self.free_load?;
+    /// The unknown load of record `k` of a fit, in words.
+    pub fn free_load_in_words(&self, k: usize, phi: &[f64]) -> Option<String> {
+        let at = self.free_load[k]?;
+        let others = self.free_load.iter().flatten();
+        let own = match others.clone().any(|o| *o != at) {
+            true => " of its own",
+            false => "",
+        };
         let m = phi[at];
         Some(match m.abs() > T.load.least {
             true => format!(
-                "it carries an unknown load, estimated beside the effects: {m:.3} kg at ({:.3}, {:.3}, {:.3}) m",
+                "it carries an unknown load{own}, estimated beside the effects: {m:.3} kg at ({:.3}, {:.3}, {:.3}) m",
                 phi[at + 1] / m,
                 phi[at + 2] / m,
                 phi[at + 3] / m

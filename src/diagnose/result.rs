@@ -9,7 +9,6 @@ use super::gap::{self, JointGap, Shares};
 use super::improve::Improved;
 use super::next::{INVISIBLE, Proposal};
 use super::noise::Source;
-use super::payload::is_free;
 use super::prior::Closeness;
 use super::search::Candidate;
 use super::second_encoder::SecondEncoder;
@@ -113,9 +112,8 @@ pub fn scaled(data: &Data, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// with the effects, which goes with the parameters `phi`.
 pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec<RecordGap> {
     let all = residuals.map(|e| scaled(data, e));
-    let remarks = |r: &Series| {
-        let unknown = is_free(r.payload);
-        let load = data.free_load_in_words(phi).filter(|_| unknown);
+    let remarks = |k: usize, r: &Series| {
+        let load = data.free_load_in_words(k, phi);
         r.remarks.iter().cloned().chain(load).collect()
     };
     data.records
@@ -133,7 +131,7 @@ pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec
                 })
                 .collect(),
             repeats: r.cycle.is_some(),
-            remarks: remarks(r),
+            remarks: remarks(k, r),
         })
         .collect()
 }

@@ -457,6 +457,62 @@ fn an_unknown_load_is_estimated_beside_the_effects() {
     carries(&diagnosed(&loaded(with, Payload::None)), 0.8);
 }
 
+/// Logs of which some carry 0.8 kg, mounted at another place each time.
+fn mounted_at(places: [Option<[f64; 2]>; 4], payload: Payload) -> Vec<Record> {
+    let empty = robots().1;
+    let machines = places.map(|place| {
+        let mut machine = empty.clone();
+        if let Some([x, y]) = place {
+            let com = nalgebra::Vector3::new(x, y, 0.0);
+            let load = Inertia::from_com(0.8, com, nalgebra::Matrix3::zeros());
+            let body = machine.bodies.last_mut().expect("a body");
+            for (b, l) in body.inertia.0.iter_mut().zip(load.0) {
+                *b += l;
+            }
+        }
+        machine
+    });
+    let mut all = logs_of(machines.each_ref(), &mut |_, _, _, _, _| 0.0);
+    for (r, place) in all.iter_mut().zip(places) {
+        r.payload = match place {
+            Some(_) => payload,
+            None => Payload::None,
+        };
+    }
+    all
+}
+
+/// A load that is mounted again in between differs by record; which record is held out does not matter.
+#[test]
+fn a_load_that_is_remounted_differs_by_record() {
+    let near = [Some([0.1, 0.02]), Some([0.13, -0.02])];
+    for (second, third) in [(near, None), ([near[0], None], near[1])] {
+        let places = [None, second[0], second[1], third];
+        let stated = diagnosed(&mounted_at(places, Payload::Unknown));
+        assert_eq!(stated.verdict, Verdict::NoGap, "{:?}", claims(&stated));
+        let remarks = stated.records.iter().flat_map(|r| &r.remarks);
+        let own = remarks.filter(|r| r.contains("load of its own")).count();
+        assert_eq!(own, 2, "{:?}", claims(&stated));
+
+        let found = diagnosed(&mounted_at(places, Payload::None));
+        let loads: Vec<_> = (found.findings.iter())
+            .filter(|f| f.effect == "payload" && f.is_claim())
+            .collect();
+        assert_eq!(loads.len(), 2, "{:?}", claims(&found));
+        for f in loads {
+            let value = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);
+            let mass = value("mass").expect("a mass");
+            assert!((mass / 0.8 - 1.0).abs() < 0.1, "{mass} kg");
+            assert_eq!(f.records.len(), 1, "{:?}", f.records);
+        }
+        assert!(
+            claims(&found)
+                .iter()
+                .all(|c| format!("{c:?}").contains("payload"))
+        );
+    }
+}
+
 /// A load that only holdout records carry cannot be predicted.
 #[test]
 fn a_load_that_nothing_can_tell_is_refused() {

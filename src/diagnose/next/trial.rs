@@ -196,7 +196,7 @@ impl Trial<'_> {
         data.window = self.data.window;
         // the robot would run it empty, and an unknown load has the last parameters
         let phi = self.phi.get(..data.parameters.len())?;
-        let empty = self.data.free_load.unwrap_or(self.phi.len());
+        let empty = self.data.first_free_load().unwrap_or(self.phi.len());
         if data.parameters.len() != empty {
             return None;
         }
