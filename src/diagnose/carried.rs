@@ -23,7 +23,7 @@ use super::column::Column;
 use super::data::Data;
 use super::decoy;
 use super::evidence::{Evidence, Fit, Projected};
-use super::payload::Loads;
+use super::payload::{Loads, is_free};
 use super::thresholds::THRESHOLDS as T;
 use crate::error::Result;
 use crate::log::{self, Payload, Purpose};
@@ -328,7 +328,10 @@ impl Carried {
         let any = told && self.records.iter().any(|k| fitted(&logs[*k]));
         let mut logs = logs.to_vec();
         for k in &self.records {
-            logs[*k].payload = Payload::Unknown;
+            // a load of known mass alone is free already, and all that are free must be stated alike
+            if !is_free(logs[*k].payload) {
+                logs[*k].payload = Payload::Unknown;
+            }
             if !any {
                 logs[*k].purpose = Purpose::Fit;
             }
