@@ -123,17 +123,20 @@ impl Data<'_> {
             return x;
         }
         let half = 0.5 * self.window / passes as f64;
+        let mean = |[before, here, after]: [f64; 3]| here + half * (before - 2.0 * here + after);
+        let mut to = x.clone();
         for _ in 0..passes {
             for k in 0..self.records.len() {
-                let x = &mut x[self.span(k)];
+                let (x, to) = (&x[self.span(k)], &mut to[self.span(k)]);
                 let last = x.len() - 1;
-                let mut before = x[0];
-                for i in 0..=last {
-                    let (here, after) = (x[i], x[(i + 1).min(last)]);
-                    x[i] = here + half * (before - 2.0 * here + after);
-                    before = here;
+                to[0] = mean([x[0], x[0], x[1.min(last)]]);
+                let inner = to.iter_mut().skip(1).zip(x.windows(3));
+                inner.for_each(|(to, w)| *to = mean([w[0], w[1], w[2]]));
+                if last > 0 {
+                    to[last] = mean([x[last - 1], x[last], x[last]]);
                 }
             }
+            std::mem::swap(&mut x, &mut to);
         }
         x
     }

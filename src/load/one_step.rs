@@ -13,7 +13,7 @@ use self::reweight::Fit;
 pub(super) use fitted::rms;
 pub use fitted::{Fitted, JointFriction};
 pub(super) use solver::Solver;
-pub(super) use spectrum::noise_like;
+pub(super) use spectrum::{Rest, samples as of_rows};
 pub use stream::Step;
 pub use zeros::Decision;
 

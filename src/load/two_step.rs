@@ -217,15 +217,17 @@ pub fn estimate(
     let (mut full, mut empty) = (Vec::new(), Vec::new());
     let mut standstill = 0.0;
     for loaded in records {
-        let to = match loaded.payload {
-            Payload::Unknown => &mut full,
-            Payload::None => &mut empty,
+        let bare = match loaded.payload {
+            Payload::Unknown => false,
+            Payload::None => true,
             Payload::Known { .. } => continue,
         };
-        let record = to.len() as u64 + 1000 * u64::from(loaded.payload == Payload::None);
-        let (chain, v0) = chain(plant, mechanism, tool, loaded, settings, record)?;
+        let count = if bare { empty.len() } else { full.len() };
+        let record = count as u64 + 1000 * u64::from(bare);
+        let before: Vec<&Chain> = full.iter().chain(&empty).collect();
+        let (chain, v0) = chain(plant, mechanism, tool, loaded, settings, record, &before)?;
         standstill = v0;
-        to.push(chain);
+        if bare { &mut empty } else { &mut full }.push(chain);
     }
     let (all, unloaded) = draws::totals(&full, &empty, &gravity)?;
     let platform = match unloaded {
@@ -257,6 +259,7 @@ fn chain(
     loaded: &Loaded,
     settings: &Settings,
     record: u64,
+    before: &[&Chain],
 ) -> Result<(Chain, f64)> {
     // friction: Coulomb and viscous beside all that the platform may carry, unweighted
     let as_loaded = Loaded {
@@ -293,7 +296,7 @@ fn chain(
         none[a * n..(a + 1) * n].fill(0.0);
     }
     Ok((
-        Chain::new(at(&force)?, &nothing, &unit, &solver, record)?,
+        Chain::new(at(&force)?, &nothing, &unit, &solver, record, before)?,
         v0,
     ))
 }

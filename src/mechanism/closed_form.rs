@@ -75,6 +75,36 @@ impl<L: Lanes, const M: usize> Coordinates<Dual<Pack<L>, M>> for PutJacobian<M> 
             unsafe { self.d.write(i * M + k, q.d[k]) }
         }
     }
+    #[inline(always)]
+    fn put_angle(&mut self, to: &[usize], y: Dual<Pack<L>, M>, x: Dual<Pack<L>, M>) {
+        let d = Dual::angle_slopes(y, x);
+        to.iter().for_each(|&i| self.put(i, Dual { v: y.v, d }));
+    }
+}
+
+/// Some coordinates of one pose, and their rows of `D`.
+struct PutRows<'a> {
+    rows: &'a [usize],
+    q: &'a mut [f64],
+    d: &'a mut [f64],
+}
+impl<const M: usize> Coordinates<Dual<Pack<f64>, M>> for PutRows<'_> {
+    #[inline(always)]
+    fn put(&mut self, i: usize, q: Dual<Pack<f64>, M>) {
+        if let Some(r) = self.rows.iter().position(|&row| row == i) {
+            self.q[r] = q.v.0;
+            for k in 0..M {
+                self.d[r * M + k] = q.d[k].0;
+            }
+        }
+    }
+    #[inline(always)]
+    fn put_angle(&mut self, to: &[usize], y: Dual<Pack<f64>, M>, x: Dual<Pack<f64>, M>) {
+        if to.iter().any(|i| self.rows.contains(i)) {
+            let angle = y.atan2(x);
+            to.iter().for_each(|&i| self.put(i, angle));
+        }
+    }
 }
 
 struct PutSensitivity<const M: usize> {
@@ -92,6 +122,16 @@ impl<L: Lanes, const M: usize> Coordinates<Dual<Taylor<Pack<L>>, M>> for PutSens
             }
         }
     }
+    #[inline(always)]
+    fn put_angle(
+        &mut self,
+        to: &[usize],
+        y: Dual<Taylor<Pack<L>>, M>,
+        x: Dual<Taylor<Pack<L>>, M>,
+    ) {
+        let d = Dual::angle_slopes(y, x);
+        to.iter().for_each(|&i| self.put(i, Dual { v: y.v, d }));
+    }
 }
 
 struct PutCurvature<const M: usize> {
@@ -104,6 +144,16 @@ impl<L: Lanes, const M: usize> Coordinates<Dual<Dual<Pack<L>, 1>, M>> for PutCur
             // SAFETY: the target points to the pack
             unsafe { self.out.write(i * M + k, q.d[k].d[0]) }
         }
+    }
+    #[inline(always)]
+    fn put_angle(
+        &mut self,
+        to: &[usize],
+        y: Dual<Dual<Pack<L>, 1>, M>,
+        x: Dual<Dual<Pack<L>, 1>, M>,
+    ) {
+        let d = Dual::angle_slopes(y, x);
+        to.iter().for_each(|&i| self.put(i, Dual { v: y.v, d }));
     }
 }
 
@@ -235,6 +285,10 @@ impl<K: Kinematics + 'static, const M: usize> Geometry for ClosedForm<K, M> {
         };
         // SAFETY: the lengths were checked
         unsafe { run(isa, &pass, x.count) }
+    }
+    fn rows(&self, x: &[f64], rows: &[usize], q: &mut [f64], d: &mut [f64]) {
+        let x: [Dual<Pack<f64>, M>; M] = std::array::from_fn(|k| Dual::variable(Pack(x[k]), k));
+        self.0.inverse(&x, &mut PutRows { rows, q, d });
     }
     fn sensitivity(&self, isa: Isa, x: &Samples, d: &mut [f64], dqd: &mut [f64], dqdd: &mut [f64]) {
         check::<M>(self.0.coordinates(), x, &[&mut *d, &mut *dqd, &mut *dqdd]);

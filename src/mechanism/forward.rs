@@ -7,7 +7,6 @@
 //! first order; where the latter fails the way is cut in halves and walked, as the robot would.
 
 use super::{Mechanism, Spread};
-use crate::dynamics::{Isa, Samples};
 use crate::error::{Error, Result};
 use nalgebra::{DMatrix, DVector};
 
@@ -34,20 +33,12 @@ impl Mechanism {
         if self.problem(x).is_some() {
             return None;
         }
-        let (n, m) = (self.robot.dof(), self.freedoms());
-        let samples = Samples {
-            dof: m,
-            count: 1,
-            q: x.to_vec(),
-            qd: vec![0.0; m],
-            qdd: vec![0.0; m],
-        };
-        let mut tree = Samples::zeros(n, 1);
-        let mut d = vec![0.0; n * m];
+        let (m, na) = (self.freedoms(), self.actuators());
+        let mut q = DVector::zeros(na);
+        let mut rows = vec![0.0; na * m];
         self.geometry
-            .motion(Isa::Scalar, &samples, &mut tree, &mut d);
-        let q = DVector::from_fn(self.actuators(), |a, _| tree.q[self.actuated[a]]);
-        let j = DMatrix::from_fn(self.actuators(), m, |a, k| d[self.actuated[a] * m + k]);
+            .rows(x, &self.actuated, q.as_mut_slice(), &mut rows);
+        let j = DMatrix::from_row_slice(na, m, &rows);
         (q.iter().chain(j.iter()).all(|v| v.is_finite())).then_some((q, j))
     }
 
@@ -129,12 +120,16 @@ impl Mechanism {
             if j.iter().chain(e.iter()).any(|x| !x.is_finite()) {
                 return Err("the motion is not finite there".to_string());
             }
+            if let Some(step) = regular(j, e) {
+                return Ok(step);
+            }
             j.clone()
                 .svd(true, true)
                 .solve(e, 1e-12)
                 .map_err(|e| e.to_string())
         };
         let first = solve(&j, &(goal - &q))?;
+        let mut ahead = Some(first.clone());
         let size = |v: &DVector<f64>| {
             (0..v.len())
                 .map(|k| match self.task.is_angle(k) {
@@ -156,7 +151,10 @@ impl Mechanism {
                 polished = true;
             }
             *iterations += 1;
-            let step = solve(&j, &(goal - &q))?;
+            let step = match ahead.take() {
+                Some(step) => step,
+                None => solve(&j, &(goal - &q))?,
+            };
             let mut fraction = 1.0;
             loop {
                 let next = &x + &step * fraction;
@@ -201,6 +199,16 @@ impl Mechanism {
         }
         Ok((x, error))
     }
+}
+
+/// Solution of a square system whose pivots differ by less than 1e8; its matrix may be singular otherwise.
+fn regular(j: &DMatrix<f64>, e: &DVector<f64>) -> Option<DVector<f64>> {
+    if !j.is_square() {
+        return None;
+    }
+    let lu = j.clone().lu();
+    let pivots = lu.u().diagonal().abs();
+    (pivots.min() > 1e-8 * pivots.max()).then(|| lu.solve(e))?
 }
 
 /// Determinant of a square matrix; 1 for others, which have no such test.

@@ -22,6 +22,17 @@ use nalgebra::{DMatrix, Vector3};
 pub trait Coordinates<S> {
     /// Coordinate `i` is `q`.
     fn put(&mut self, i: usize, q: S);
+
+    /// Coordinates `to` are the angle `atan2(y, x)`, which nothing else follows from. What takes derivatives alone, or
+    /// other coordinates alone, leaves the angle itself out.
+    #[inline(always)]
+    fn put_angle(&mut self, to: &[usize], y: S, x: S)
+    where
+        S: Scalar,
+    {
+        let angle = y.atan2(x);
+        to.iter().for_each(|&i| self.put(i, angle));
+    }
 }
 
 impl<S> Coordinates<S> for [S] {
@@ -112,6 +123,20 @@ pub trait Geometry: std::fmt::Debug + Send + Sync {
     /// Positions, velocities and accelerations of all tree coordinates into `motion` (sized
     /// already), and `D` into `d`. Numbers that are not finite where a pose cannot be reached.
     fn motion(&self, isa: Isa, x: &Samples, motion: &mut Samples, d: &mut [f64]);
+
+    /// Coordinates `rows` of one pose into `q`, and their rows of `D` into `d`, row by row: what forward kinematics asks for in
+    /// every step.
+    fn rows(&self, x: &[f64], rows: &[usize], q: &mut [f64], d: &mut [f64]) {
+        let (n, m) = (self.coordinates(), self.task());
+        let mut still = Samples::zeros(m, 1);
+        still.q.copy_from_slice(x);
+        let (mut tree, mut all) = (Samples::zeros(n, 1), vec![0.0; n * m]);
+        self.motion(Isa::Scalar, &still, &mut tree, &mut all);
+        for (r, &i) in rows.iter().enumerate() {
+            q[r] = tree.q[i];
+            d[r * m..(r + 1) * m].copy_from_slice(&all[i * m..(i + 1) * m]);
+        }
+    }
 
     /// `∂q̇/∂x` and `∂q̈/∂x` at fixed `ẋ, ẍ` (and, for use as it comes, `D`): with
     /// `∂q̇/∂ẋ = ∂q̈/∂ẍ = D` and `∂q̈/∂ẋ = 2 ∂q̇/∂x` all that a gradient needs.

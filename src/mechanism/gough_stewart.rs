@@ -264,8 +264,8 @@ impl Kinematics for Kinematic {
             let l = linear::turned_back(&leg.rotation, l);
             let yz = l[1] * l[1] + l[2] * l[2];
             q.put(i, (l[0] * l[0] + yz).sqrt() + (-leg.zero));
-            q.put(6 + 2 * i, (-l[1]).atan2(l[2]));
-            q.put(7 + 2 * i, l[0].atan2(yz.sqrt()));
+            q.put_angle(&[6 + 2 * i], -l[1], l[2]);
+            q.put_angle(&[7 + 2 * i], l[0], yz.sqrt());
         }
         for k in 0..6 {
             q.put(18 + k, x[k]);

@@ -157,12 +157,11 @@ impl Kinematics for Parallelograms {
                 e[1] * cos + e[2] * sin,
                 e[2] * cos - e[1] * sin + (-arm),
             ];
-            let gamma = (-b[1]).atan2(b[2]);
-            let beta = b[0].atan2((b[1] * b[1] + b[2] * b[2]).sqrt());
-            for rod in 0..2 {
-                q.put(n + 4 * i + 2 * rod, gamma);
-                q.put(n + 4 * i + 2 * rod + 1, beta);
-            }
+            // both rods turn alike
+            let first = n + 4 * i;
+            q.put_angle(&[first, first + 2], -b[1], b[2]);
+            let along = (b[1] * b[1] + b[2] * b[2]).sqrt();
+            q.put_angle(&[first + 1, first + 3], b[0], along);
         }
         let m = self.task();
         for k in 0..m {

@@ -120,6 +120,17 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
         }
         Dual { v, d }
     }
+    /// Gradient of `atan2(y, x)`.
+    #[inline(always)]
+    pub fn angle_slopes(y: Self, x: Self) -> [S; N] {
+        let inverse = S::constant(1.0) / (y.v * y.v + x.v * x.v);
+        let (fx, fy) = (x.v * inverse, y.v * inverse);
+        let mut d = y.d;
+        for i in 0..N {
+            d[i] = y.d[i] * fx - x.d[i] * fy;
+        }
+        d
+    }
 }
 
 impl<S: Scalar, const N: usize> Add for Dual<S, N> {
@@ -216,14 +227,11 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         (self.chain(s, c), self.chain(c, -s))
     }
     #[inline(always)]
-    fn atan2(mut self, x: Self) -> Self {
-        let inverse = S::constant(1.0) / (self.v * self.v + x.v * x.v);
-        let (fx, fy) = (x.v * inverse, self.v * inverse);
-        for i in 0..N {
-            self.d[i] = self.d[i] * fx - x.d[i] * fy;
+    fn atan2(self, x: Self) -> Self {
+        Dual {
+            v: self.v.atan2(x.v),
+            d: Dual::angle_slopes(self, x),
         }
-        self.v = self.v.atan2(x.v);
-        self
     }
 }
 

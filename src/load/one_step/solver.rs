@@ -1,6 +1,6 @@
 //! Weighted least squares for deviations, load and friction of every record at once.
 
-use super::spectrum;
+use super::spectrum::{self, Rest};
 use crate::dot::dot;
 use crate::error::{Error, Result};
 use crate::load::system::{Part, System};
@@ -243,7 +243,7 @@ impl<'a> Solver<'a> {
         &self,
         deviation: &dyn Fn(usize, usize) -> f64,
         coloured: bool,
-    ) -> Result<(Solution, Mat<f64>, Vec<Vec<f64>>)> {
+    ) -> Result<(Solution, Mat<f64>, Vec<Rest>)> {
         let (a, y) = self.rows(deviation, coloured);
         let n = a.ncols();
         let qr = a.qr();
@@ -259,10 +259,11 @@ impl<'a> Solver<'a> {
             ));
         }
         let r = qr.thin_R().to_owned();
-        let (mut covariance, mut power) = (Mat::zeros(0, 0), Vec::new());
+        let (mut covariance, mut rests) = (Mat::zeros(0, 0), Vec::new());
         if coloured {
             let q = qr.compute_thin_Q();
-            power = self.powers(&a, &y, &values, &q);
+            rests = self.rests(&a, &y, &values, &q);
+            let power: Vec<_> = rests.iter().map(Rest::power).collect();
             covariance = self.sandwich(q, &r, &power);
         }
         let solution = Solution {
@@ -270,7 +271,7 @@ impl<'a> Solver<'a> {
             values,
             r,
         };
-        Ok((solution, covariance, power))
+        Ok((solution, covariance, rests))
     }
 
     /// Weighted rows and right-hand side, with those of the regularisation; turned into those of single frequencies or not.
@@ -303,6 +304,14 @@ impl<'a> Solver<'a> {
     /// # Errors
     /// Signals that are not finite.
     pub fn power(&self, deviation: &dyn Fn(usize, usize) -> f64) -> Result<Vec<Vec<f64>>> {
+        Ok(self.left(deviation)?.iter().map(Rest::power).collect())
+    }
+
+    /// What a fit leaves, actuator by actuator in record by record, in rows of single frequencies.
+    ///
+    /// # Errors
+    /// Signals that are not finite.
+    pub fn left(&self, deviation: &dyn Fn(usize, usize) -> f64) -> Result<Vec<Rest>> {
         Ok(self.solve_with(deviation, true)?.2)
     }
 
@@ -424,8 +433,8 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Power over frequency of what is left, actuator by actuator in record by record, from turned rows.
-    fn powers(&self, a: &Mat<f64>, y: &Mat<f64>, values: &[f64], q: &Mat<f64>) -> Vec<Vec<f64>> {
+    /// What is left, actuator by actuator in record by record, from turned rows.
+    fn rests(&self, a: &Mat<f64>, y: &Mat<f64>, values: &[f64], q: &Mat<f64>) -> Vec<Rest> {
         let mut out = Vec::new();
         for [first, count] in self.blocks() {
             let (mut e, mut h) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -434,7 +443,10 @@ impl<'a> Solver<'a> {
                 e.push(y[(row, 0)] - fit);
                 h.push((0..q.ncols()).map(|c| q[(row, c)] * q[(row, c)]).sum());
             }
-            out.push(spectrum::power(&e, &h));
+            out.push(Rest {
+                rows: e,
+                leverage: h,
+            });
         }
         out
     }

@@ -50,21 +50,59 @@ pub fn samples(rows: &[f64]) -> Vec<f64> {
     Inverse::new(n).signal((0..kept).map(at).collect())
 }
 
-/// Noise whose rows have this power, normal.
-pub fn noise_like(power: &[f64], r: &mut impl rand::Rng) -> Vec<f64> {
-    let rows: Vec<f64> = power
-        .iter()
-        .map(|s| {
-            // Box and Muller
-            let (u, v): (f64, f64) = (r.random_range(f64::MIN_POSITIVE..1.0), r.random());
-            (-2.0 * u.ln() * s).sqrt() * (std::f64::consts::TAU * v).cos()
-        })
-        .collect();
-    samples(&rows)
+/// What a fit leaves of an actuator in a record, turned into rows of single frequencies.
+#[derive(Debug, Clone)]
+pub struct Rest {
+    /// residual of each row
+    pub rows: Vec<f64>,
+    /// leverage of each row
+    pub leverage: Vec<f64>,
+}
+
+impl Rest {
+    /// Power at each row.
+    pub fn power(&self) -> Vec<f64> {
+        power(&self.rows, &self.leverage)
+    }
+
+    /// What of this comes back in another record of as many rows: `Σ e_i f_i/√(Σ e_i² Σ f_i²)` in a window about each row,
+    /// `1` where both leave the same.
+    pub fn coherence(&self, other: &Rest) -> Vec<f64> {
+        let n = self.rows.len();
+        let mut sums = vec![[0.0; 4]; n + 1];
+        for i in 0..n {
+            let (e, f) = (self.rows[i], other.rows[i]);
+            let more = [e * f, e * e, f * f, 1.0 - self.leverage[i]];
+            sums[i + 1] = std::array::from_fn(|k| sums[i][k] + more[k]);
+        }
+        (0..n)
+            .map(|i| {
+                let (from, to) = window(i, n, &|from, to| sums[to][3] - sums[from][3]);
+                let [both, own, its] = std::array::from_fn(|k| sums[to][k] - sums[from][k]);
+                let size = (own * its).sqrt();
+                match size > 0.0 {
+                    true => (both / size).clamp(-1.0, 1.0),
+                    false => 0.0,
+                }
+            })
+            .collect()
+    }
+}
+
+/// Rows about row `i` of `n` that hold [`FREEDOM`], or all.
+fn window(i: usize, n: usize, held: &dyn Fn(usize, usize) -> f64) -> (usize, usize) {
+    let mut half = 2;
+    loop {
+        let (from, to) = (i.saturating_sub(half), (i + half + 1).min(n));
+        if to - from == n || held(from, to) >= FREEDOM {
+            return (from, to);
+        }
+        half += 1 + half / 4;
+    }
 }
 
 /// Power at each of these rows, from the residuals `e` in them and their leverages.
-pub fn power(e: &[f64], leverage: &[f64]) -> Vec<f64> {
+fn power(e: &[f64], leverage: &[f64]) -> Vec<f64> {
     let n = e.len();
     let mut square = vec![0.0; n + 1];
     let mut freedom = vec![0.0; n + 1];
@@ -79,15 +117,9 @@ pub fn power(e: &[f64], leverage: &[f64]) -> Vec<f64> {
     let least = LEAST * square[n] / all;
     (0..n)
         .map(|i| {
-            let mut half = 2;
-            loop {
-                let (from, to) = (i.saturating_sub(half), (i + half + 1).min(n));
-                let held = freedom[to] - freedom[from];
-                if held >= FREEDOM || to - from == n {
-                    return ((square[to] - square[from]) / held.max(1e-9)).max(least);
-                }
-                half += 1 + half / 4;
-            }
+            let held = |from: usize, to: usize| freedom[to] - freedom[from];
+            let (from, to) = window(i, n, &held);
+            ((square[to] - square[from]) / held(from, to).max(1e-9)).max(least)
         })
         .collect()
 }
@@ -121,5 +153,25 @@ mod tests {
         let h: Vec<f64> = (0..200).map(|i| f64::from(i % 2)).collect();
         let s = power(&e, &h);
         assert!(s.iter().all(|s| (s - 4.0).abs() < 0.6), "{s:?}");
+    }
+
+    #[test]
+    fn what_two_records_leave_alike_is_coherent() {
+        let wave =
+            |n: usize, k: f64| -> Vec<f64> { (0..n).map(|i| (k * i as f64).sin()).collect() };
+        let rest = |rows: Vec<f64>| Rest {
+            leverage: vec![0.0; rows.len()],
+            rows,
+        };
+        let (one, other) = (rest(wave(400, 1.3)), rest(wave(400, 2.1)));
+        let turned = rest(one.rows.iter().map(|v| -2.0 * v).collect());
+        assert!(one.coherence(&one).iter().all(|c| (c - 1.0).abs() < 1e-12));
+        assert!(
+            one.coherence(&turned)
+                .iter()
+                .all(|c| (c + 1.0).abs() < 1e-12)
+        );
+        let mean = one.coherence(&other).iter().sum::<f64>() / 400.0;
+        assert!(mean.abs() < 0.1, "{mean}");
     }
 }

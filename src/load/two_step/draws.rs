@@ -4,17 +4,18 @@
 //! step takes from the first, noise in the first column of `X₁`. So the whole chain is repeated: friction fit, both steps,
 //! loaded minus empty. Its forces get draws of noise that has the power over frequency of what the fit of each
 //! record leaves (`one_step::spectrum`) and grows towards standstill as that does, so what is left counts as
-//! autocorrelated as it is. The covariance is the mean
+//! autocorrelated as it is. Records of one motion share what comes back in both (friction that the fit has no term for), and
+//! the load is their difference: their draws have the coherence that their residuals have. The covariance is the mean
 //! square about the estimate: where noise moves the mean, as it does that of `1/m`, the shift is in it.
 
 use super::{PlatformSample, Total, total};
 use crate::error::Result;
-use crate::load::one_step::{Solver, noise_like, rms};
+use crate::load::one_step::{Rest, Solver, of_rows, rms};
 use crate::load::weight::Spread;
 use crate::robot::Inertia;
 use faer::Mat;
 use nalgebra::Vector3;
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
@@ -24,6 +25,47 @@ const DRAWS: usize = 150;
 /// Seed of the draws.
 const SEED: u64 = 0x2517;
 
+/// Difference of the speeds of two records, relative, up to which their motion is the same.
+const SAME: f64 = 0.05;
+
+/// What is left of the forces of a record.
+struct Left {
+    /// velocities of the actuators
+    speed: Vec<f64>,
+    /// by actuator
+    rests: Vec<Rest>,
+    /// number of the record, which its draws follow from
+    record: u64,
+    /// whether its draws follow from those of another record, too
+    follows: bool,
+}
+
+impl Left {
+    fn same_motion(&self, speed: &[f64]) -> bool {
+        let square = |of: &mut dyn Iterator<Item = f64>| of.map(|v| v * v).sum::<f64>();
+        let pairs = self.speed.iter().zip(speed);
+        self.speed.len() == speed.len()
+            && square(&mut pairs.map(|(a, b)| a - b))
+                <= SAME.powi(2) * square(&mut speed.iter().copied())
+    }
+}
+
+/// Normal random numbers of a record, in the order of draws, actuators and rows.
+struct Normals(ChaCha8Rng);
+
+impl Normals {
+    fn of(record: u64) -> Self {
+        Normals(ChaCha8Rng::seed_from_u64(SEED + record))
+    }
+
+    /// Box and Muller.
+    fn next(&mut self) -> f64 {
+        let u: f64 = self.0.random_range(f64::MIN_POSITIVE..1.0);
+        let v: f64 = self.0.random();
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+}
+
 /// One record, ready to be evaluated for other forces.
 pub struct Chain {
     /// as measured, friction taken off
@@ -32,10 +74,12 @@ pub struct Chain {
     unit: Vec<Vec<[Vector3<f64>; 2]>>,
     /// disturbance of the forces in each draw, friction taken off once more
     draws: Vec<Vec<f64>>,
+    left: Left,
 }
 
 impl Chain {
     /// From the samples, the wrenches of unit forces of each actuator, those without any force, and the fit of friction.
+    /// `before`: records that came before.
     ///
     /// # Errors
     /// Signals that are not finite.
@@ -45,6 +89,7 @@ impl Chain {
         unit: &[Vec<PlatformSample>],
         solver: &Solver,
         record: u64,
+        before: &[&Chain],
     ) -> Result<Self> {
         let part = &solver.system.parts[0];
         let (rows, n) = (part.y.len(), part.count);
@@ -61,12 +106,33 @@ impl Chain {
             let variance = spreads[i / n].variance(part.speed[i]);
             variance.sqrt().max(f64::MIN_POSITIVE)
         };
-        let power = solver.power(&|_, i| deviation(i))?;
-        let mut r = ChaCha8Rng::seed_from_u64(SEED + record);
+        let rests = solver.left(&|_, i| deviation(i))?;
+        let power: Vec<Vec<f64>> = rests.iter().map(Rest::power).collect();
+        let first = before.iter().map(|c| &c.left);
+        let first = { first }.find(|l| !l.follows && l.same_motion(&part.speed));
+        let mut common = first.map(|first| {
+            let pairs = first.rests.iter().zip(&rests);
+            let coherence: Vec<Vec<f64>> = pairs.map(|(one, other)| one.coherence(other)).collect();
+            (Normals::of(first.record), coherence)
+        });
+        let mut own = Normals::of(record);
         let mut noise = Mat::<f64>::zeros(rows, DRAWS);
         for k in 0..DRAWS {
             for (a, power) in power.iter().enumerate() {
-                for (i, e) in noise_like(power, &mut r).into_iter().enumerate() {
+                let drawn: Vec<f64> = { power.iter().enumerate() }
+                    .map(|(i, power)| {
+                        let z = own.next();
+                        let z = match &mut common {
+                            Some((first, coherence)) => {
+                                let c = coherence[a][i];
+                                c * first.next() + (1.0 - c * c).sqrt() * z
+                            }
+                            None => z,
+                        };
+                        power.sqrt() * z
+                    })
+                    .collect();
+                for (i, e) in of_rows(&drawn).into_iter().enumerate() {
                     noise[(a * n + i, k)] = deviation(a * n + i) * e;
                 }
             }
@@ -93,6 +159,12 @@ impl Chain {
             samples,
             unit,
             draws,
+            left: Left {
+                speed: part.speed.clone(),
+                rests,
+                record,
+                follows: common.is_some(),
+            },
         })
     }
 
