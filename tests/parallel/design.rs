@@ -187,7 +187,7 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
     for (name, most) in [("delta", 40.0), ("h4", 40.0), ("hexapod", 150.0)] {
         let plant = bundled(name);
         let own = mechanism(&plant).in_actuators().unwrap();
-        let settings = quick(2).with(|set| {
+        let settings = quick(1).with(|set| {
             set.period = 4.0;
             set.harmonics = 4;
         });

@@ -134,7 +134,10 @@ pub(crate) fn way(
                     let w = (s * sub + u) as f64 / (FINE * sub) as f64;
                     let tau = load[i.min(last)] + w * (load[next] - load[i.min(last)]);
                     let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
-                    let mut t = -k * beyond * (1.0 + cubic * (beyond / twist).powi(2).min(9.0));
+                    let mut t = -k * beyond;
+                    if cubic != 0.0 {
+                        t *= 1.0 + cubic * (beyond / twist).powi(2).min(9.0);
+                    }
                     // flanks push only while they touch
                     if gap == 0.0 {
                         t -= d * v;
