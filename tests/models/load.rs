@@ -163,25 +163,27 @@ fn errors(found: &[f64; 10], truth: &[f64; 10]) -> [f64; 10] {
     std::array::from_fn(|i| (found[i] - truth[i]) / scale[i])
 }
 
+/// With another motion without the load: errors of friction do not cancel.
 fn hexapod(truth: &Truth, rate: f64, count: usize, seed: u64, settings: &Settings) -> Identified {
+    hexapod_along([seed, seed + 500], truth, rate, count, seed, settings)
+}
+
+/// `motions`: seeds of the motions with and without the load.
+fn hexapod_along(
+    motions: [u64; 2],
+    truth: &Truth,
+    rate: f64,
+    count: usize,
+    seed: u64,
+    settings: &Settings,
+) -> Identified {
     let plant = Plant::load("hexapod").unwrap();
     // 0.3 to 1.8 Hz
     let base = count as f64 / rate / 10.0;
-    let x = multisine(
-        &plant,
-        count,
-        rate,
-        &[3.0, 8.0, 13.0].map(|h| h * base),
-        seed,
-    );
-    // another motion without the load: errors of friction do not cancel
-    let z = multisine(
-        &plant,
-        count,
-        rate,
-        &[3.0, 8.0, 13.0].map(|h| h * base),
-        seed + 500,
-    );
+    let [x, z] = motions.map(|seed| {
+        let harmonics = [3.0, 8.0, 13.0].map(|h| h * base);
+        multisine(&plant, count, rate, &harmonics, seed)
+    });
     let empty = Truth {
         load: None,
         gain: truth.gain.clone(),
@@ -311,6 +313,37 @@ fn stribeck_friction_and_noise_stay_within_the_targets() {
     println!("two steps           {two:.3?}");
     assert!(one[0] < 0.1 && one[1] < 0.3 && one[2] < 1.5, "{one:?}");
     assert!(two[2] > one[2] && two[1] > one[1]);
+}
+
+/// Friction that the two steps have no term for leaves the same in both records of one motion, and the load is their
+/// difference: its errors are as large as is stated, neither much smaller nor larger.
+#[test]
+fn two_steps_know_what_records_of_one_motion_share() {
+    let truth = Truth {
+        load: Some(Inertia::from_quantities(&LOAD)),
+        stribeck: 15.0,
+        noise: 2.0,
+        ..Truth::default()
+    };
+    let (mut square, mut inside, mut all) = (0.0, 0, 0);
+    for seed in 20..28 {
+        let found = hexapod_along([seed; 2], &truth, 100.0, 500, seed, &Settings::default());
+        let body = &found.two_step.as_ref().unwrap().load;
+        let (v, s) = (body.values(), body.stds());
+        for k in 0..10 {
+            let off = (v[k] - LOAD[k]) / s[k];
+            square += off * off;
+            all += 1;
+            inside += i32::from(off.abs() < 1.96);
+        }
+    }
+    let (size, coverage) = (
+        (square / f64::from(all)).sqrt(),
+        f64::from(inside) / f64::from(all),
+    );
+    println!("two steps: errors {size:.2} of what is stated, coverage of 95 %: {coverage:.3}");
+    assert!((0.5..1.3).contains(&size), "{size}");
+    assert!(coverage > 0.88, "{coverage}");
 }
 
 #[test]
