@@ -140,6 +140,7 @@ fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
             .collect();
         assert_eq!(claims, [("stribeck_friction", "leg2".into(), true)]);
     };
+    named("leg2=60,0.18");
     named("leg2=40,0.18");
     let effect = Some((Field::Stribeck, "leg2=30,0.15"));
     let mut case = Case::new("hexapod", effect, 1.5, 0.4, None);
