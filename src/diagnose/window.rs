@@ -10,9 +10,11 @@ pub const FINE: usize = T.window.fine;
 
 /// Smooth sign.
 pub fn sign(v: f64, width: f64) -> f64 {
-    (v / width)
-        .clamp(-T.window.saturated, T.window.saturated)
-        .tanh()
+    let x = v / width;
+    match x.abs() < T.window.saturated {
+        true => x.tanh(),
+        false => 1f64.copysign(x),
+    }
 }
 
 /// A smooth signal averaged over a triangle of plus and minus one sample: `x + Δ² ẍ / 12`.

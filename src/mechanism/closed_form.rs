@@ -78,7 +78,9 @@ impl<L: Lanes, const M: usize> Coordinates<Dual<Pack<L>, M>> for PutJacobian<M> 
     #[inline(always)]
     fn put_angle(&mut self, to: &[usize], y: Dual<Pack<L>, M>, x: Dual<Pack<L>, M>) {
         let d = Dual::angle_slopes(y, x);
-        to.iter().for_each(|&i| self.put(i, Dual { v: y.v, d }));
+        for &i in to {
+            self.put(i, Dual { v: y.v, d });
+        }
     }
 }
 
@@ -102,7 +104,9 @@ impl<const M: usize> Coordinates<Dual<Pack<f64>, M>> for PutRows<'_> {
     fn put_angle(&mut self, to: &[usize], y: Dual<Pack<f64>, M>, x: Dual<Pack<f64>, M>) {
         if to.iter().any(|i| self.rows.contains(i)) {
             let angle = y.atan2(x);
-            to.iter().for_each(|&i| self.put(i, angle));
+            for &i in to {
+                self.put(i, angle);
+            }
         }
     }
 }
@@ -130,7 +134,9 @@ impl<L: Lanes, const M: usize> Coordinates<Dual<Taylor<Pack<L>>, M>> for PutSens
         x: Dual<Taylor<Pack<L>>, M>,
     ) {
         let d = Dual::angle_slopes(y, x);
-        to.iter().for_each(|&i| self.put(i, Dual { v: y.v, d }));
+        for &i in to {
+            self.put(i, Dual { v: y.v, d });
+        }
     }
 }
 
@@ -153,7 +159,9 @@ impl<L: Lanes, const M: usize> Coordinates<Dual<Dual<Pack<L>, 1>, M>> for PutCur
         x: Dual<Dual<Pack<L>, 1>, M>,
     ) {
         let d = Dual::angle_slopes(y, x);
-        to.iter().for_each(|&i| self.put(i, Dual { v: y.v, d }));
+        for &i in to {
+            self.put(i, Dual { v: y.v, d });
+        }
     }
 }
 

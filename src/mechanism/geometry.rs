@@ -31,7 +31,9 @@ pub trait Coordinates<S> {
         S: Scalar,
     {
         let angle = y.atan2(x);
-        to.iter().for_each(|&i| self.put(i, angle));
+        for &i in to {
+            self.put(i, angle);
+        }
     }
 }
 

@@ -82,12 +82,12 @@ pub(crate) fn way(
         let backwards = |ratio: f64| {
             let ((mut x, mut v), drained) = (start, 2.0 * ratio * mean * omega);
             for i in (first..back).rev() {
-                let (m, steps) = (mass[i].max(0.05 * mean), FINE * sub);
+                let (inverse, steps) = (1.0 / mass[i].max(0.05 * mean), FINE * sub);
                 for s in 0..steps {
                     let tau = load[i + 1] + s as f64 / steps as f64 * (load[i] - load[i + 1]);
                     let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
                     let tau = tau + slope(stiff, i) * x;
-                    v += h * (-k * beyond - drained * v - tau) / m;
+                    v += h * (-k * beyond - drained * v - tau) * inverse;
                     x += h * v;
                 }
             }
@@ -125,7 +125,7 @@ pub(crate) fn way(
         }
         for i in first..upto {
             let next = (i + 1).min(last);
-            let m = mass[i].max(0.05 * mean);
+            let inverse = 1.0 / mass[i].max(0.05 * mean);
             let (stiff, drag) = (slope(stiff, i), slope(drag, i));
             for s in 0..FINE {
                 let mut sum = 0.0;
@@ -145,7 +145,7 @@ pub(crate) fn way(
                         let damped = t - d * v;
                         t = if damped * t > 0.0 { damped } else { 0.0 };
                     }
-                    let a = (t - tau - stiff * x - drag * v) / m;
+                    let a = (t - tau - stiff * x - drag * v) * inverse;
                     sum += a;
                     v += h * a;
                     x += h * v;
