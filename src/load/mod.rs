@@ -43,6 +43,7 @@ pub mod page;
 pub mod parts;
 pub(crate) mod records;
 pub(crate) mod settings;
+mod speeds;
 mod suspicion;
 pub(crate) mod system;
 #[doc(hidden)]

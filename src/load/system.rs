@@ -2,6 +2,7 @@
 //! columns that may.
 
 use super::records::{Loaded, of_platform};
+use super::speeds::Speeds;
 use crate::base::BaseParameters;
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -45,7 +46,7 @@ pub struct Part {
     /// friction factors of each actuator, `FRICTION` order
     pub friction: [Vec<f64>; 3],
     /// velocities of the actuators at full rate
-    raw_speed: Vec<f64>,
+    speeds: Speeds,
     filter: Decimator,
 }
 
@@ -78,12 +79,7 @@ impl Part {
 
     /// A function of the speed of an actuator, zero at rest, filtered like everything else.
     fn of_speed(&self, a: usize, f: impl Fn(f64) -> f64) -> Vec<f64> {
-        let n = self.raw_speed.len() / (self.y.len() / self.count.max(1)).max(1);
-        let raw: Vec<f64> = self.raw_speed[a * n..(a + 1) * n]
-            .iter()
-            .map(|v| if *v == 0.0 { 0.0 } else { f(*v) })
-            .collect();
-        self.filter.apply(&raw)
+        self.filter.apply(&self.speeds.of(a, f))
     }
 }
 
@@ -198,10 +194,13 @@ fn part(plant: &Plant, tool: usize, loaded: &Loaded, kept: &[usize]) -> Result<P
         let y = record.filtered(torque);
         y.iter().zip(&rigid).map(|(a, b)| a - b).collect()
     };
+    let speeds = Speeds::new(moved.qd.clone(), record)?;
     let friction = FRICTION.map(|term| {
-        let raw: Vec<f64> = (0..na * n)
-            .map(|i| term_factor(term, moved.at(i / n, i % n)))
-            .collect();
+        let at = |a: usize, i: usize| term_factor(term, moved.at(a, i));
+        let raw: Vec<f64> = match term {
+            JointTerm::Coulomb => (0..na).flat_map(|a| speeds.of(a, f64::signum)).collect(),
+            _ => (0..na * n).map(|i| at(i / n, i % n)).collect(),
+        };
         record.filtered(&raw)
     });
     let speed = (0..na)
@@ -225,7 +224,7 @@ fn part(plant: &Plant, tool: usize, loaded: &Loaded, kept: &[usize]) -> Result<P
         tool: filter(&tool_full),
         deviation,
         friction,
-        raw_speed: moved.qd.clone(),
+        speeds,
         filter: record.filter.clone(),
     })
 }

@@ -75,7 +75,8 @@ pub fn warning(solver: &Solver) -> Option<Warning> {
         format!(
             "what the model leaves of the forces looks like joints of the legs that are {:.2} mm from where the robot file says \
              (standard deviation of each coordinate and length). They count as unknowns, so the load is known less well; \
-             other errors of the legs can look the same: measure the geometry (`excite calibrate`)",
+             other errors of the legs, and friction where joints turn, can look the same: measure the geometry \
+             (`excite calibrate`)",
             1e3 * found.spread
         ),
     ))
