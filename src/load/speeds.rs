@@ -10,11 +10,9 @@
 //! ```
 
 use crate::error::Result;
-use crate::signals::butterworth::{Butterworth, first_derivative};
-use crate::signals::{Prepared, cutoff};
+use crate::signals::butterworth::{first_derivative, smoother};
+use crate::signals::{Prepared, Settings, cutoff, mean};
 
-/// Order of the low-pass of the deviations.
-const ORDER: usize = 4;
 /// A function counts period by period where the speed is below so many of the largest deviation.
 const NEAR: f64 = 4.0;
 
@@ -55,27 +53,79 @@ impl Speeds {
 }
 
 /// Samples near a reversal of an actuator, with the velocities of every period.
-fn turns(record: &Prepared, a: usize, mean: &[f64]) -> Result<Vec<(usize, Vec<f64>)>> {
+fn turns(record: &Prepared, a: usize, speed: &[f64]) -> Result<Vec<(usize, Vec<f64>)>> {
     let Some(p) = record.periods.as_ref().filter(|p| p.count > 1) else {
         return Ok(Vec::new());
     };
     let n = p.samples;
-    let of = |k: usize, i: usize| p.position[k][a * n + i];
-    let middle = |i: usize| (0..p.count).map(|k| of(k, i)).sum::<f64>() / p.count as f64;
-    let middle: Vec<f64> = (0..n).map(middle).collect();
+    let parts: Vec<&[f64]> = p.position.iter().map(|q| &q[a * n..(a + 1) * n]).collect();
+    let middle = mean(&parts);
     // the periods follow one another
-    let off: Vec<f64> = (0..p.count)
-        .flat_map(|k| middle.iter().enumerate().map(move |(i, m)| of(k, i) - m))
+    let off: Vec<f64> = (parts.iter())
+        .flat_map(|q| q.iter().zip(&middle).map(|(q, m)| q - m))
         .collect();
-    let rate = record.rate;
-    let found = cutoff::aperiodic(&off, rate, ORDER).frequency;
-    let low = Butterworth::low_pass(ORDER, found.min(0.45 * rate), rate)?;
-    let pad = low.default_pad().max((3.0 * rate / found) as usize);
-    let rates = first_derivative(&low.zero_phase(&off, pad), 1.0 / rate);
+    let (rate, order) = (record.rate, Settings::default().order);
+    let low = smoother(order, cutoff::aperiodic(&off, rate, order).frequency, rate)?;
+    let rates = first_derivative(&low(&off), 1.0 / rate);
     let near = |(i, v): (usize, &f64)| {
         let each = (0..p.count).map(|k| rates[k * n + i]);
         let most = each.clone().fold(0.0, |m: f64, d| m.max(d.abs()));
         (v.abs() < NEAR * most).then(|| (i, each.map(|d| v + d).collect()))
     };
-    Ok(mean.iter().enumerate().filter_map(near).collect())
+    Ok(speed.iter().enumerate().filter_map(near).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::{Channels, Record, parts::Purpose};
+    use crate::plant::Plant;
+    use std::f64::consts::TAU;
+
+    /// A joint that does not follow exactly turns elsewhere in every period; the mean friction is that of all periods.
+    #[test]
+    fn the_mean_friction_is_that_of_all_periods() {
+        let (rate, period, count) = (200.0, 4.0, 5);
+        let n = (rate * period) as usize;
+        // sines of 0.25 Hz, and of 0.57 Hz, which no period repeats
+        let waves = [(0.25, 0.5), (0.57, 4e-3)];
+        let at = |i: usize, j: usize| i as f64 / rate + 0.3 * j as f64;
+        let place = |t: f64| -> f64 { waves.iter().map(|(f, a)| a * (TAU * f * t).sin()).sum() };
+        let rate_of = |t: f64| -> f64 {
+            waves
+                .iter()
+                .map(|(f, a)| a * TAU * f * (TAU * f * t).cos())
+                .sum()
+        };
+        let plant = Plant::load("planar2").unwrap();
+        let all = n * count;
+        let of = |f: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+            (0..2)
+                .map(|j| (0..all).map(|i| f(i, j)).collect())
+                .collect()
+        };
+        let channels = Channels {
+            t: (0..all).map(|i| i as f64 / rate).collect(),
+            q: of(&|i, j| place(at(i, j))),
+            // a torque that does not move is a stuck channel
+            tau: of(&|i, j| rate_of(at(i, j))),
+            qref: None,
+        };
+        let record =
+            Record::from_channels("it", channels, &plant, Purpose::Fit, Some(period)).unwrap();
+        let prepared = Prepared::new(&record, &plant, &Settings::default()).unwrap();
+        assert_eq!(prepared.periods.as_ref().map(|p| p.count), Some(count));
+        let speeds = Speeds::new(prepared.motion.qd.clone(), &prepared).unwrap();
+        for j in 0..2 {
+            let found = speeds.of(j, f64::signum);
+            let (mut own, mut plain) = (0.0, 0.0);
+            for i in 0..n {
+                let each = (0..count).map(|k| rate_of(at(k * n + i, j)).signum());
+                let truth = each.sum::<f64>() / count as f64;
+                own += (found[i] - truth).abs();
+                plain += (prepared.motion.qd[j * n + i].signum() - truth).abs();
+            }
+            assert!(plain > 2.0 && own < 0.2 * plain, "{own} {plain}");
+        }
+    }
 }

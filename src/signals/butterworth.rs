@@ -104,6 +104,19 @@ impl Butterworth {
     }
 }
 
+/// Continuation of the ends of a motion, in periods of the cut-off.
+const PAD: f64 = 3.0;
+
+/// What a motion that does not repeat passes: this filter forward and backward, with its cut-off below half of the rate.
+///
+/// # Errors
+/// As [`Butterworth::low_pass`].
+pub fn smoother(order: usize, cutoff: f64, rate: f64) -> Result<impl Fn(&[f64]) -> Vec<f64>> {
+    let low = Butterworth::low_pass(order, cutoff.min(0.45 * rate), rate)?;
+    let pad = low.default_pad().max((PAD * rate / cutoff) as usize);
+    Ok(move |x: &[f64]| low.zero_phase(x, pad))
+}
+
 /// First derivative by central differences of sixth order, one-sided at the ends. `h` is the step.
 ///
 /// The error is `(ωh)⁶/140` of the true derivative.

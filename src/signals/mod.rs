@@ -46,6 +46,7 @@ pub use butterworth::Butterworth;
 pub use decimate::Decimator;
 pub(crate) use parts::{Derivation, Periods};
 #[doc(hidden)]
+pub(crate) use prepare::mean;
 pub use prepare::{averaged, common_cutoff};
 
 use crate::dynamics::Samples;

@@ -1,6 +1,6 @@
 //! From a record to a [`Prepared`] one.
 
-use super::butterworth::{Butterworth, first_derivative, second_derivative};
+use super::butterworth::{first_derivative, second_derivative, smoother};
 use super::{Decimator, Derivation, Periods, Prepared, Settings, cutoff, fourier, wiener};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
@@ -8,9 +8,6 @@ use crate::log::Record;
 use crate::plant::{self, Plant};
 use faer::Mat;
 use rayon::prelude::*;
-
-/// Continuation of the ends for the Butterworth filter, in periods of its cut-off.
-const PAD: f64 = 3.0;
 
 /// Cut-off of the parallel filter, in bandwidths of the motion.
 const BANDS: f64 = 10.0;
@@ -96,14 +93,13 @@ impl Prepared {
                         .min(most)
                         .min(0.45 * rate),
                 };
-                let low = Butterworth::low_pass(settings.order, frequency.min(0.45 * rate), rate)?;
-                let pad = low.default_pad().max((PAD * rate / frequency) as usize);
-                let smooth = low.zero_phase(q, pad);
+                let low = smoother(settings.order, frequency, rate)?;
+                let smooth = low(q);
                 Ok((
                     frequency,
                     match dq {
                         Some(dq) => {
-                            let velocity = low.zero_phase(&dq[j], pad);
+                            let velocity = low(&dq[j]);
                             let acceleration = first_derivative(&velocity, record.step);
                             [smooth, velocity, acceleration]
                         }
@@ -394,7 +390,8 @@ fn assemble(series: Vec<Rates>) -> Samples {
     out
 }
 
-fn mean(parts: &[&[f64]]) -> Vec<f64> {
+/// Mean of signals of one length, sample by sample.
+pub(crate) fn mean(parts: &[&[f64]]) -> Vec<f64> {
     let n = parts.first().map_or(0, |p| p.len());
     (0..n)
         .map(|i| parts.iter().map(|p| p[i]).sum::<f64>() / parts.len() as f64)

@@ -11,7 +11,7 @@ use crate::common::parallel::{matrix, numbers, vector};
 use crate::common::shared::checks;
 use excite::dynamics::Samples;
 
-use excite::load::parts::Parameters;
+use excite::load::parts::{LoadBody, Parameters};
 use excite::load::two_step::PlatformSample;
 use excite::load::{Identified, Loaded, Settings, from_records};
 use excite::log::parts::{Payload, Purpose};
@@ -161,6 +161,12 @@ fn errors(found: &[f64; 10], truth: &[f64; 10]) -> [f64; 10] {
         size(9, 9) / 100.0,
     ];
     std::array::from_fn(|i| (found[i] - truth[i]) / scale[i])
+}
+
+/// Errors of a load in units of what is stated of them.
+fn in_stds(found: &LoadBody) -> [f64; 10] {
+    let (v, s) = (found.values(), found.stds());
+    std::array::from_fn(|k| (v[k] - LOAD[k]) / s[k])
 }
 
 /// With another motion without the load: errors of friction do not cancel.
@@ -328,10 +334,7 @@ fn two_steps_know_what_records_of_one_motion_share() {
     let (mut square, mut inside, mut all) = (0.0, 0, 0);
     for seed in 20..28 {
         let found = hexapod_along([seed; 2], &truth, 100.0, 500, seed, &Settings::default());
-        let body = &found.two_step.as_ref().unwrap().load;
-        let (v, s) = (body.values(), body.stds());
-        for k in 0..10 {
-            let off = (v[k] - LOAD[k]) / s[k];
+        for off in in_stds(&found.two_step.as_ref().unwrap().load) {
             square += off * off;
             all += 1;
             inside += i32::from(off.abs() < 1.96);
@@ -356,11 +359,9 @@ fn stated_deviations_cover_the_errors() {
     let (mut inside, mut all) = (0, 0);
     for seed in 20..28 {
         let found = hexapod(&truth, 100.0, 500, seed, &Settings::default());
-        let body = &found.one_step.load;
-        let (v, s) = (body.values(), body.stds());
-        for k in 0..10 {
+        for off in in_stds(&found.one_step.load) {
             all += 1;
-            inside += usize::from((v[k] - LOAD[k]).abs() < 1.96 * s[k]);
+            inside += usize::from(off.abs() < 1.96);
         }
     }
     let coverage = inside as f64 / all as f64;
