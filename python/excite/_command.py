@@ -68,8 +68,7 @@ class Command:
 class Feedback:
     """How deviations are answered along a record."""
 
-    def __init__(self, robot: Robot, forward: Dict[str, Any]) -> None:
-        self._robot = robot
+    def __init__(self, forward: Dict[str, Any]) -> None:
         known: Optional[Dict[str, Any]] = forward.get("controller")
         self._kind = "soft" if known is None else str(known["kind"])
         omega = 2 * np.pi * float(forward.get("bandwidth", SOFT))
@@ -82,24 +81,24 @@ class Feedback:
             "inverse_dynamics": "the recorded commands, under the inverse-dynamics controller that the log shows",
         }.get(self._kind, self._kind)
 
-    def along(self, q: Array) -> "Tuple[Array, Array, Array]":
-        """Gains at every sample, each ``(samples, joints, joints)``."""
-        n = q.shape[1]
+    def along(self, inertia: Array) -> "Tuple[Array, Array, Array]":
+        """Gains at every sample, each ``(samples, joints, joints)``, from the mass matrix there."""
         if self._kind == "actuators":
-            parts = [np.broadcast_to(np.diag(self._gains[:, k]), (len(q), n, n)) for k in range(3)]
+            parts = [np.broadcast_to(np.diag(self._gains[:, k]), inertia.shape) for k in range(3)]
         else:
-            inertia = mass(self._robot, q)
             parts = [inertia * self._gains[0, k] for k in range(3)]
         return parts[0], parts[1], parts[2]
 
-    def stiff(self, q: Array, frequency: float) -> "Tuple[Array, Array, Array]":
-        """Gains that hold a model to the record, for the time before a run."""
-        inertia, omega = mass(self._robot, q), 2 * np.pi * frequency
-        return inertia * omega**2, inertia * 2 * omega, 0 * inertia
+
+def stiff(inertia: Array, frequency: float) -> "Tuple[Array, Array, Array]":
+    """Gains that hold a model to the record, for the time before a run."""
+    omega = 2 * np.pi * frequency
+    return inertia * omega**2, inertia * 2 * omega, 0 * inertia
 
 
 def mass(robot: Robot, q: Array) -> Array:
-    """Nominal mass matrix along positions, ``(samples, joints, joints)``."""
+    """Nominal torques of the joints by the accelerations of the coordinates, ``(samples, joints, coordinates)``: the mass
+    matrix of a serial robot."""
     still = robot.torque(q)
     rows: List[Array] = []
     for j in range(q.shape[1]):

@@ -43,7 +43,9 @@ def _module(text: str) -> ModuleType:
 class Model:
     """A robot file for MuJoCo, with the file of effects beside it where there is one."""
 
-    def __init__(self, xml: str, effects: Optional[str], joints: List[str], name: str) -> None:
+    def __init__(
+        self, xml: str, effects: Optional[str], joints: List[str], name: str, tree: Optional[List[str]] = None
+    ) -> None:
         mj = self._mj = mujoco()
         try:
             self._model = mj.MjModel.from_xml_string(xml)
@@ -51,9 +53,21 @@ class Model:
             raise unusable(f"MuJoCo does not load the {name} model: {e}") from None
         self._effects = None if effects is None else _module(effects)
         self.name = name
-        self._joints = [self._model.joint(j) for j in joints]
-        self._at = np.array([int(j.qposadr[0]) for j in self._joints])
-        self._dof = np.array([int(j.dofadr[0]) for j in self._joints])
+        #: of a parallel robot, whose loops equality constraints close, or whose legs are tendons
+        self._closed = tree is not None
+        self._legs = [] if tree is None else self._tendons(joints)
+        self._joints = [] if self._legs else [self._model.joint(j) for j in joints]
+        self._at = np.array([int(j.qposadr[0]) for j in self._joints], int)
+        self._dof = np.array([int(j.dofadr[0]) for j in self._joints], int)
+        # a state is that of all joints; legs that are tendons have none
+        self._driven_states = [] if tree is None else [tree.index(j) for j in joints]
+        known = range(len(joints)) if tree is None else [k for k, j in enumerate(tree) if self._has(j)]
+        self._known = np.array(list(known), int)
+        states = self._joints if tree is None else [self._model.joint(tree[k]) for k in known]
+        self._states_at = np.array([int(j.qposadr[0]) for j in states], int)
+        self._states_dof = np.array([int(j.dofadr[0]) for j in states], int)
+        self._all = len(joints) if tree is None else len(tree)
+        self._zero = np.zeros(len(self._legs))
         bits = mj.mjtDisableBit
         # limits and contacts are not what is compared
         self._model.opt.disableflags |= int(bits.mjDSBL_CONTACT) | int(bits.mjDSBL_LIMIT)
@@ -66,13 +80,25 @@ class Model:
         self.lasting: List[str] = list(getattr(self._effects, "LASTING", []))
         self.begins: Dict[int, Dict[str, Any]] = {}
         #: whether something in it goes on by itself, so that a run needs a time before it
-        self.remembers = self._model.nv > len(joints) or bool(getattr(self._effects, "REMEMBERED", []))
+        self.remembers = self._model.nv > len(states) or bool(getattr(self._effects, "REMEMBERED", []))
+
+    def _has(self, joint: str) -> bool:
+        mj = self._mj
+        return bool(mj.mj_name2id(self._model, mj.mjtObj.mjOBJ_JOINT, joint) >= 0)
+
+    def _tendons(self, joints: List[str]) -> List[int]:
+        """The tendons of these names, where all of them are tendons between two points."""
+        mj = self._mj
+        found = [int(mj.mj_name2id(self._model, mj.mjtObj.mjOBJ_TENDON, j)) for j in joints]
+        return found if min(found) >= 0 and not any(self._has(j) for j in joints) else []
 
     def _actuators(self) -> Optional[Array]:
         """Actuators in the order of the joints, where every joint has one."""
         found = []
-        for joint in self._joints:
-            own = np.flatnonzero(self._model.actuator_trnid[:, 0] == joint.id)
+        kind = self._mj.mjtTrn.mjTRN_TENDON if self._legs else self._mj.mjtTrn.mjTRN_JOINT
+        for on in self._legs or [joint.id for joint in self._joints]:
+            model = self._model
+            own = np.flatnonzero((model.actuator_trnid[:, 0] == on) & (model.actuator_trntype == kind))
             if len(own) != 1:
                 return None
             found.append(int(own[0]))
@@ -91,11 +117,68 @@ class Model:
             data.qpos[self._at], data.qvel[self._dof], data.qacc[self._dof] = q[i], dq[i], ddq[i]
             mj.mj_inverse(self._model, data)
             tau[i] = data.qfrc_inverse[self._dof]
-        gains = np.ones(len(self._at))
-        if self._drives is not None:
-            gains = self._model.actuator_gainprm[self._drives, 0] * self._model.actuator_gear[self._drives, 0]
-        out: Array = tau / gains
+        out: Array = tau if self._drives is None else tau / self._gains()
         return out
+
+    def closing(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """As :meth:`inverse` for a parallel robot, along a motion of all joints of its tree.
+
+        With the Jacobian ``J`` of the gaps of the loops, ``S tau + J^T lambda`` is what inverse dynamics of the open tree
+        asks of its joints, where ``S`` has a column for each drive.
+        """
+        mj, model = self._mj, self._model
+        data, n, drives = mj.MjData(model), model.nv, len(self._legs) or len(self._dof)
+        usual = int(model.opt.disableflags)
+        # the loops are open for inverse dynamics; friction stays
+        model.opt.disableflags = usual | int(mj.mjtDisableBit.mjDSBL_EQUALITY)
+        try:
+            welded = model.eq_type == mj.mjtEq.mjEQ_WELD
+            rows = drives + int(np.sum(np.where(welded, 6, 3)))
+            both, tau = np.zeros((rows, n)), np.zeros((len(q), drives))
+            gains = np.ones(drives) if self._drives is None else self._gains()
+            if not self._legs:
+                both[np.arange(drives), self._dof] = gains
+            ends = [[np.zeros((3, n)) for _ in range(4)] for _ in welded]
+            for i in range(len(q)):
+                state = (x[i, self._known] for x in (q, dq, ddq))
+                data.qpos[self._states_at], data.qvel[self._states_dof], data.qacc[self._states_dof] = state
+                mj.mj_inverse(model, data)
+                if self._legs:
+                    both[:drives] = gains[:, None] * self._lengthening(data)
+                at = drives
+                for e, (pa, ra, pb, rb) in enumerate(ends):
+                    mj.mj_jacSite(model, data, pa, ra, model.eq_obj1id[e])
+                    mj.mj_jacSite(model, data, pb, rb, model.eq_obj2id[e])
+                    both[at : at + 3] = pa - pb
+                    at += 3
+                    if welded[e]:
+                        both[at : at + 3] = ra - rb
+                        at += 3
+                tau[i] = np.linalg.lstsq(both.T, data.qfrc_inverse, rcond=1e-10)[0][:drives]
+        finally:
+            model.opt.disableflags = usual
+        # what the drive does without a command
+        bias: Array = 0.0 if self._drives is None else model.actuator_biasprm[self._drives, 0] / gains
+        return tau - bias
+
+    def _lengthening(self, data: Any) -> Array:
+        """Jacobian of the lengths of the legs that are tendons."""
+        mj, model = self._mj, self._model
+        rows = np.zeros((len(self._legs), model.nv))
+        ends = [np.zeros((3, model.nv)) for _ in range(2)]
+        for k, leg in enumerate(self._legs):
+            at = int(model.tendon_adr[leg])
+            sites = [int(model.wrap_objid[at]), int(model.wrap_objid[at + 1])]
+            for jacobian, site in zip(ends, sites):
+                mj.mj_jacSite(model, data, jacobian, None, site)
+            way = data.site_xpos[sites[1]] - data.site_xpos[sites[0]]
+            rows[k] = way @ (ends[1] - ends[0]) / np.linalg.norm(way)
+        return rows
+
+    def _gains(self) -> Array:
+        """Torque of every joint by the signal of its actuator."""
+        gains: Array = self._model.actuator_gainprm[self._drives, 0] * self._model.actuator_gear[self._drives, 0]
+        return gains
 
     def along(self, records: List[Any], joints: int) -> List[Array]:
         """``inverse`` along all records; what lasts goes from one to the next in the order of the experiment."""
@@ -103,6 +186,9 @@ class Model:
         out = {}
         for k in sorted(range(len(records)), key=lambda k: int(records[k]["order"])):
             r = records[k]
+            if self._closed:
+                out[k] = self.closing(*(from_columns(r[f"tree_{n}"], self._all) for n in ("q", "dq", "ddq")))
+                continue
             q, dq, ddq = (from_columns(r[name], joints) for name in ("q", "dq", "ddq"))
             self.begins[int(r["order"])] = {key: memory[key] for key in self.lasting if key in memory}
             out[k] = self.inverse(q, dq, ddq, r["dt"], memory)
@@ -128,9 +214,11 @@ class Model:
         lasting: Optional[Dict[str, Any]] = None,
     ) -> Array:
         """Positions under a command, one row for each of its samples; ``before`` is played first. ``lasting`` is the
-        state of what lasts."""
+        state of what lasts. The state at the start is that of all joints of the tree."""
         mj, effects = self._mj, self._effects
-        steps = max(int(math.ceil(dt / STEP - 1e-9)), 1)
+        # constraints that close loops are stiff: not slower than the file asks
+        longest = min(STEP, self._own_step) if self._closed else STEP
+        steps = max(int(math.ceil(dt / longest - 1e-9)), 1)
         self._model.opt.timestep = dt / steps
         data = mj.MjData(self._model)
         previous = mj.get_mjcb_passive()
@@ -153,10 +241,14 @@ class Model:
             zero = np.zeros_like(q)
             way, rate, _ = self._effects.displacement(q, dq, zero)
             q, dq = q + way, dq + rate
-        data.qpos[self._at], data.qvel[self._dof] = q, dq
+        data.qpos[self._states_at], data.qvel[self._states_dof] = q[self._known], dq[self._known]
         self._mj.mj_forward(self._model, data)
+        if self._legs:
+            self._zero = data.ten_length[self._legs] - q[self._driven_states]
 
     def _read(self, data: Any) -> "Tuple[Array, Array]":
+        if self._legs:
+            return data.ten_length[self._legs] - self._zero, data.ten_velocity[self._legs]
         q, dq = data.qpos[self._at], data.qvel[self._dof]
         if self._effects is not None and self._displaced:
             q = np.asarray(self._effects.encoder(q))

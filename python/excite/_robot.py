@@ -169,6 +169,12 @@ class Robot:
         return {j["name"]: j["limits"] for j in self._card["coordinates"]}
 
     @property
+    def tree(self) -> Optional[List[str]]:
+        """Names of all joints of a parallel robot, in the order of its robot files; ``None`` of others."""
+        names: Optional[List[str]] = self._card["tree"] if self.closed else None
+        return names
+
+    @property
     def closed(self) -> bool:
         """Whether it is a parallel robot."""
         return bool(self._card["closed"])

@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _excite
 from ._arrays import Array, from_columns, numbers, pandas
-from ._command import Command, Feedback
+from ._command import Command, Feedback, mass, stiff
 from ._errors import Notice, emit, unusable
 from ._mujoco import Model
 from ._progress import Bar, Progress
@@ -125,8 +125,6 @@ def verify(
     own = as_experiment(experiment)
     core = own._native
     robot = Robot(core.plant(), ("native",))
-    if robot.closed and simulator == "mujoco":
-        raise unusable(f"{robot.name} is a parallel robot: its files for MuJoCo are not written; give functions of yours")
     lengths = sorted({float(h) for h in horizons})
     if not lengths or not all(math.isfinite(h) and h > 0 for h in lengths) or runs < 1:
         raise unusable("horizons are lengths in s, above 0, and runs at least 1")
@@ -154,7 +152,7 @@ def verify(
     if any(r.get("payload") == "unknown" for r in core.records()):
         words = "a record carries an unknown load: what the diagnosis found of it is in the model of no record"
         warnings.append(Notice("payload", "records", words))
-    feedback = Feedback(robot, said["forward_simulation"])
+    feedback = Feedback(said["forward_simulation"])
     torque = _torques(core, raw, models, chosen, said) if models else _no_torques(robot)
     with Bar(progress, "verify") as bar:
         listed = _horizons(chosen, lengths, runs, robot, feedback, steppers, models, bar.report)
@@ -190,8 +188,8 @@ def _simulators(
         if nominal is None or improved is None:
             raise unusable("the robot has no file for MuJoCo; see the warnings of the diagnosis")
         models = [
-            Model(nominal, texts.get("effects.py"), robot.joints, "nominal"),
-            Model(improved, found.files.get("effects.py"), robot.joints, "improved"),
+            Model(nominal, texts.get("effects.py"), robot.joints, "nominal", robot.tree),
+            Model(improved, found.files.get("effects.py"), robot.joints, "improved", robot.tree),
         ]
         return ["nominal", "improved"], models, []
     given = list(simulator) if isinstance(simulator, (list, tuple)) else [simulator]
@@ -290,8 +288,15 @@ def _horizons(
 def _of(r: Any, robot: Robot, feedback: Feedback) -> Dict[str, Any]:
     n = len(robot.joints)
     q, dq, tau = (from_columns(r[k], n) for k in ("q", "dq", "tau"))
-    arrays = {"q": q, "dq": dq, "tau": np.array(tau)}
-    return {**arrays, "gains": feedback.along(q), "hold": feedback.stiff(q, HOLD)}
+    if robot.closed:
+        inertia = mass(robot, from_columns(r["x"], len(robot.coordinates)))
+        # tau = (d tau / d ddx) (d x / d q) ddq
+        inertia = inertia @ r["rates"].reshape(len(robot.coordinates), n, -1).transpose(2, 0, 1)
+        states = [from_columns(r[k], len(robot.tree or [])) for k in ("tree_q", "tree_dq")]
+    else:
+        inertia, states = mass(robot, q), [q, dq]
+    arrays = {"q": q, "dq": dq, "tau": np.array(tau), "states": states}
+    return {**arrays, "gains": feedback.along(inertia), "hold": stiff(inertia, HOLD)}
 
 
 def _parts(r: Any, robot: Robot, horizon: Optional[float], runs: int) -> "List[Tuple[int, int]]":
@@ -331,7 +336,8 @@ def _run(
             first = max(start - int(math.ceil(BEFORE / dt)), 0)
             before = command(first, start, "hold")
         lasting = model.lasts(int(r["order"]), a["q"][:first], a["dq"][:first], dt)
-        ran = model.run(a["q"][start], a["dq"][start], command(start, stop, "gains"), dt, before, lasting)
+        state = [x[start] for x in a["states"]]
+        ran = model.run(*state, command(start, stop, "gains"), dt, before, lasting)
         found.append(ran - log)
     return _Run(r["name"], start * dt, np.arange(stop - start + 1) * dt, log, found)
 

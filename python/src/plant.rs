@@ -131,6 +131,7 @@ impl Plant {
             "gravity": p.robot().gravity.as_slice(),
             "joints": joints,
             "coordinates": coordinates,
+            "tree": p.robot().joint_names(),
             "parameters": parameters,
             "bodies": p.robot().bodies.iter().map(|b| &b.name).collect::<Vec<_>>(),
         })

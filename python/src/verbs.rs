@@ -344,18 +344,26 @@ pub fn formats() -> Vec<(&'static str, &'static str)> {
     cards.map(|c| (c.name, c.about)).collect()
 }
 
-/// The records as the diagnosis sees them: what a simulator needs to be compared with them.
+/// The records as the diagnosis sees them: what a simulator needs to be compared with them. Of a parallel robot also the
+/// motion of its coordinates and of all joints of its tree, and `rates`, entry `(x·actuators + a)·count + s`: by how much
+/// coordinate `x` moves with actuator `a`.
 #[pyfunction]
 pub fn series<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'py, PyDict>> {
     let core = experiment.core.clone();
     let (all, noise) = simply(py, move |_| {
         let data = diagnosis::prepare(&core.plant, &core.records)?;
         let noise: Vec<f64> = data.noise.iter().map(|n| n.std).collect();
-        Ok((data.records, noise))
+        let mut all = Vec::new();
+        for r in data.records {
+            let loops = core.plant.mechanism();
+            let motion = loops.map(|m| m.motion(&r.x)).transpose()?;
+            all.push((r, motion));
+        }
+        Ok((all, noise))
     })?;
     let out = PyDict::new(py);
     let mut records = Vec::new();
-    for r in all {
+    for (r, motion) in all {
         let d = PyDict::new(py);
         d.set_item("name", r.name)?;
         d.set_item("holdout", !r.fit)?;
@@ -370,6 +378,17 @@ pub fn series<'py>(py: Python<'py>, experiment: &Experiment) -> PyResult<Bound<'
             ("tau", r.tau),
         ] {
             d.set_item(name, values.into_pyarray(py))?;
+        }
+        if let Some(motion) = motion {
+            for (name, values) in [
+                ("x", r.x.q),
+                ("tree_q", motion.tree.q),
+                ("tree_dq", motion.tree.qd),
+                ("tree_ddq", motion.tree.qdd),
+                ("rates", motion.a),
+            ] {
+                d.set_item(name, values.into_pyarray(py))?;
+            }
         }
         records.push(d);
     }

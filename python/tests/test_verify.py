@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,6 +67,42 @@ def test_a_model_that_is_not_improved_shows_no_shrink(hidden, diagnosis):
     found = excite.verify(hidden, diagnosis=wrong, horizons=(0.1,))
     assert found.claimed > 0.9 and abs(found.shrink) < 0.01
     assert all(abs(h["shrink"]) < 0.01 for h in found.horizons)
+
+
+def hexapod(mass):
+    """The bundled hexapod, with its legs or with legs that weigh nothing."""
+    here = Path(__file__).resolve().parents[2]
+    text = (here / "src/mechanism/bundled/hexapod.toml").read_text(encoding="utf-8")
+    if not mass:
+        lines = [k for k in text.splitlines() if not k.startswith(("cylinder = ", "rod = "))]
+        text = "\n".join(lines).replace('bodies = "legs"', 'bodies = "platform"')
+    return excite.Robot._from_files({"robot.toml": 'prior = "identified"\n' + text}, "robot.toml")
+
+
+@pytest.mark.parametrize("mass", [True, False])
+def test_a_parallel_robot_in_mujoco(mass):
+    """Legs are closed by constraints, or are tendons where they weigh nothing; a hidden load shows in both."""
+    pytest.importorskip("mujoco")
+    robot = hexapod(mass)
+    here = Path(__file__).resolve().parents[2]
+    motion = excite.Trajectory.read(here / "trajectories/hexapod/trajectory.json")
+    load = (10.0, 0.3, -0.5, 1.0, 0.16, 0.0, 0.0, 0.16, 0.0, 0.12)
+    logs = [
+        excite.simulate(robot, motion, periods=2, rate=200, payload=load, seed=k).record(use, name=use, payload=None)
+        for k, use in enumerate(("fit", "holdout"))
+    ]
+    hidden = excite.Experiment(robot, logs)
+    diagnosis = excite.diagnose(hidden, next=False)
+    xml = diagnosis.files["robot.xml"]
+    assert ("<tendon>" in xml) != mass and ("<connect " in xml) == mass
+    found = excite.verify(hidden, diagnosis=diagnosis, horizons=(0.3,), runs=4)
+    assert [c["effect"] for c in found.to_dict()["claims"]] == ["payload"]
+    assert found.claimed > 0.9 and found.shrink > 0.9 * found.claimed
+    torque = found.to_dict()["torque"]["joints"]
+    nominal, own = (sum(j[k] for j in torque) for k in ("nominal", "own"))
+    assert nominal == pytest.approx(own, rel=0.05)
+    for h in found.horizons:
+        assert h["shrink"] > 0.9, h
 
 
 def integrate(robot):

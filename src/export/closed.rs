@@ -2,11 +2,13 @@
 //!
 //! A platform hangs on its task coordinates, whose joints have no drive and whose carriers weigh a milligram; legs and rods
 //! hang on the base. Where the end of a leg or rod meets the platform, a `connect` holds two sites together; the closures of
-//! `loops` are `connect` (position) and `weld` (pose). Sites, because a point of the second body would follow from the
+//! `loops` are `connect` (position) and `weld` (pose); [legs without mass](legs) are tendons. Sites, because a point of the second body would follow from the
 //! posture at zero, in which the loops are open; the keyframe `home` closes them.
 //!
 //! Where a rod ends is found from the model itself: the point of its axis that stays where it is in the frame of the
 //! platform, or of one of its bars, while these move.
+
+mod legs;
 
 use super::mujoco::body::{kind, open, placement};
 use super::mujoco::followers;
@@ -19,6 +21,7 @@ use crate::mechanism::{Mechanism, Source};
 use crate::plant::Plant;
 use crate::robot::{JointTerm, Motion, Robot};
 use crate::solid::shape::Pose;
+use legs::Legs;
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use std::fmt::Write;
 
@@ -29,6 +32,8 @@ pub struct Closed;
 const STEP: f64 = 5e-4;
 /// Stiffness and damping ratio of the constraints: the shortest time that the step allows.
 const REFERENCE: &str = "solref=\"0.001 1\" solimp=\"0.999 0.9999 0.0001\"";
+/// The shortest reference of dry friction.
+const DRY: &str = "solreffriction=\"0.0001 1\" solimpfriction=\"0.99 0.99 0.001\"";
 /// How far a point of a rod may move in the frame of what it is fixed to, of the robot's size.
 const FIXED: f64 = 1e-7;
 /// How far home is left to see what moves with what, m and rad.
@@ -60,11 +65,15 @@ impl Format for Closed {
         let joins = joins(mechanism)?;
         let mut lines = remark::lines(model.remarks, self);
         lines.extend(breakaway(model.robot));
-        lines.push("Loops are closed by equality constraints between sites; they hold in the keyframe `home`.".into());
+        let legs = Legs::of(mechanism, model.robot, &joins);
+        lines.push(match legs {
+            None => "Loops are closed by equality constraints between sites; they hold in the keyframe `home`.".into(),
+            Some(_) => "Legs without mass are tendons: forces along the line between their joints.".into(),
+        });
         Ok(format!(
             "{}{}",
             xml_comment(&lines),
-            text(mechanism, model.robot, &joins)
+            text(mechanism, model.robot, &joins, legs.as_ref())
         ))
     }
 }
@@ -186,53 +195,62 @@ fn ends(mechanism: &Mechanism) -> Result<Vec<Join>> {
     .collect()
 }
 
-fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join]) -> String {
+fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join], legs: Option<&Legs>) -> String {
     let mut out = String::new();
     let g = robot.gravity;
     let _ = writeln!(
         out,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
          <option timestep=\"{STEP}\" gravity=\"{} {} {}\" integrator=\"implicitfast\"/>\n  <default>\n    \
-         <joint solreffriction=\"0.0001 1\" solimpfriction=\"0.99 0.99 0.001\"/>\n    <equality {REFERENCE}/>\n  </default>",
+         <joint {DRY}/>\n    {}\n  </default>",
         escape(&robot.name),
         g.x,
         g.y,
-        g.z
+        g.z,
+        match legs {
+            None => format!("<equality {REFERENCE}/>"),
+            Some(_) => format!("<tendon {DRY}/>"),
+        }
     );
     out += "  <worldbody>\n";
     sites(joins, None, "    ", &mut out);
     for b in (0..robot.bodies.len()).filter(|&b| robot.bodies[b].parent.is_none()) {
-        body(mechanism, robot, joins, b, 2, &mut out);
+        match legs.and_then(|l| l.begins(b)) {
+            None => body(mechanism, robot, joins, b, 2, &mut out),
+            Some(leg) => {
+                let p = robot.bodies[b].position;
+                let (x, y, z) = (p.x, p.y, p.z);
+                let _ = writeln!(
+                    out,
+                    "    <site name=\"loop{}_a\" pos=\"{x} {y} {z}\" size=\"0.005\"/>",
+                    leg + 1
+                );
+            }
+        }
     }
-    out += "  </worldbody>\n  <equality>\n";
-    for (i, join) in joins.iter().enumerate() {
-        let kind = if join.whole { "weld" } else { "connect" };
-        let _ = writeln!(
-            out,
-            "    <{kind} name=\"loop{0}\" site1=\"loop{0}_a\" site2=\"loop{0}_b\"/>",
-            i + 1
-        );
+    out += "  </worldbody>\n";
+    match legs {
+        None => closures(joins, &mut out),
+        Some(legs) => legs.write(robot, &mut out),
     }
-    out += "  </equality>\n";
     followers(robot, &mut out);
     out += "  <actuator>\n";
     for &a in &mechanism.actuated {
         let joint = &robot.joints[a];
         let name = escape(&joint.name);
+        let at = legs.map_or(format!("joint=\"{name}\""), |l| l.drive(robot, a));
         let effort = joint.limits.effort;
         let range = match effort.is_finite() && effort > 0.0 {
             true => format!(" forcerange=\"-{effort} {effort}\""),
             false => String::new(),
         };
-        let _ = writeln!(
-            out,
-            "    <general name=\"{name}\" joint=\"{name}\"{range}/>"
-        );
+        let _ = writeln!(out, "    <general name=\"{name}\" {at}{range}/>");
     }
     out += "  </actuator>\n";
     if let Ok(q) = mechanism.inverse(&mechanism.home) {
-        let all: Vec<String> = order(robot)
-            .into_iter()
+        let written = order(robot).into_iter();
+        let all: Vec<String> = written
+            .filter(|b| legs.is_none_or(|l| !l.has(robot, *b)))
             .map(|b| {
                 let body = &robot.bodies[b];
                 match leads(robot, b) {
@@ -249,6 +267,20 @@ fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join]) -> String {
     }
     out += "</mujoco>\n";
     out
+}
+
+/// What closes the loops.
+fn closures(joins: &[Join], out: &mut String) {
+    *out += "  <equality>\n";
+    for (i, join) in joins.iter().enumerate() {
+        let kind = if join.whole { "weld" } else { "connect" };
+        let _ = writeln!(
+            out,
+            "    <{kind} name=\"loop{0}\" site1=\"loop{0}_a\" site2=\"loop{0}_b\"/>",
+            i + 1
+        );
+    }
+    *out += "  </equality>\n";
 }
 
 /// Bodies as MuJoCo orders them: each before its children, whole branches one after the other.
