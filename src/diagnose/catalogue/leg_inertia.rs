@@ -40,6 +40,9 @@ impl Effect for LegInertia {
                     .for_each(|k| robot.bodies[*b].inertia.0[*k] += eta);
             }
         }
+        if unknowns(cx).iter().any(|u| u.name == "cylinder_m") {
+            share(robot);
+        }
         Some(Part::Bodies)
     }
 
@@ -56,6 +59,41 @@ impl Effect for LegInertia {
             .zip(numbers)
             .map(|(u, (eta, std))| value(u.name, *eta, *std, u.unit))
             .collect()
+    }
+}
+
+/// Shares between cylinder and rod of each leg what forces cannot tell apart, so that both can exist where any two can.
+///
+/// A cylinder turns about a point that stays where it is, and the rod turns with it: the mass of the cylinder counts for
+/// nothing, and of `Ixx` and `Izz` only the sums do. With `m`, `h` the rod's mass and first moment and `h_c` that of the
+/// cylinder, bodies exist if `Ixx − h²/m > Izz/2` for both; what the sum has more than that is shared.
+fn share(robot: &mut Robot) {
+    let named = |kind: &str, i: usize| {
+        let name = format!("{kind}{i}");
+        robot.bodies.iter().position(|b| b.name == name)
+    };
+    let legs: Vec<[usize; 2]> = (1..)
+        .map_while(|i| Some([named("cylinder", i)?, named("rod", i)?]))
+        .collect();
+    for [cylinder, rod] in legs {
+        let both = [cylinder, rod].map(|b| robot.bodies[b].inertia.0);
+        let [across, along] = [4, 9].map(|k| both[0][k] + both[1][k]);
+        let (mass, moment, of_cylinder) = (both[1][0], both[1][3], both[0][3]);
+        let room = across - 0.5 * along - moment * moment / mass;
+        if !(mass > 0.0 && along >= 0.0 && room > 0.0) {
+            continue;
+        }
+        for (b, a, own) in [
+            (cylinder, 0.5 * room, 0.0),
+            (rod, 0.5 * room, moment * moment / mass),
+        ] {
+            let i = &mut robot.bodies[b].inertia.0;
+            i[4] = a + own + 0.25 * along;
+            i[7] = i[4];
+            i[9] = 0.5 * along;
+        }
+        // the mass that leaves it half of its room
+        robot.bodies[cylinder].inertia.0[0] = 4.0 * of_cylinder * of_cylinder / room;
     }
 }
 
@@ -135,4 +173,46 @@ fn legs(cx: &Context) -> Option<Vec<Column>> {
             closed_column(cx, &phi)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanism::Mechanism;
+
+    /// What is shared changes no force, and makes bodies that can exist of such as cannot.
+    #[test]
+    fn cylinder_and_rod_share_what_forces_cannot_tell_apart() {
+        let mut m: Mechanism = plant::Plant::load("hexapod")
+            .unwrap()
+            .mechanism()
+            .unwrap()
+            .clone();
+        for b in &mut m.robot.bodies {
+            let i = &mut b.inertia.0;
+            match &b.name {
+                n if n.starts_with("cylinder") => {
+                    *i = [0.0, 0.0, 0.0, 1.1, 0.7, 0.0, 0.0, 0.7, 0.0, -0.01];
+                }
+                n if n.starts_with("rod") => {
+                    *i = [2.5, 0.0, 0.0, -0.6, 0.1, 0.0, 0.0, 0.1, 0.0, 0.03];
+                }
+                _ => {}
+            }
+        }
+        let before = plant::Plant::from(m.clone());
+        assert!(!crate::export::impossible(&before, before.robot()).is_empty());
+        share(&mut m.robot);
+        let after = plant::Plant::from(m);
+        assert_eq!(
+            crate::export::impossible(&after, after.robot()),
+            Vec::<usize>::new()
+        );
+        let x = before.random_states(50, 3);
+        let tau = [&before, &after].map(|p| p.nominal_torque(&x).unwrap());
+        let largest = tau[0].iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        for (a, b) in tau[0].iter().zip(&tau[1]) {
+            assert!((a - b).abs() < 1e-11 * largest, "{a} {b}");
+        }
+    }
 }
