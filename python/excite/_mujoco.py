@@ -158,8 +158,9 @@ class Model:
         finally:
             model.opt.disableflags = usual
         # what the drive does without a command
-        bias: Array = 0.0 if self._drives is None else model.actuator_biasprm[self._drives, 0] / gains
-        return tau - bias
+        bias = np.zeros(drives) if self._drives is None else model.actuator_biasprm[self._drives, 0]
+        out: Array = tau - bias / gains
+        return out
 
     def _lengthening(self, data: Any) -> Array:
         """Jacobian of the lengths of the legs that are tendons."""

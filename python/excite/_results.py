@@ -318,7 +318,11 @@ class Diagnosis(_Model):
     @property
     def robot(self) -> Robot:
         """The improved robot, for every other function."""
-        return self._robot_of_files()
+        robot = self._robot_of_files()
+        if robot.joints != self._value["joints"]:
+            # of a parallel robot the URDF alone is its open tree
+            raise unusable("no robot file could be written that closes the loops; see .warnings")
+        return robot
 
     @property
     def next(self) -> Optional[Trajectory]:

@@ -336,8 +336,8 @@ def _run(
             first = max(start - int(math.ceil(BEFORE / dt)), 0)
             before = command(first, start, "hold")
         lasting = model.lasts(int(r["order"]), a["q"][:first], a["dq"][:first], dt)
-        state = [x[start] for x in a["states"]]
-        ran = model.run(*state, command(start, stop, "gains"), dt, before, lasting)
+        at, rate = (x[start] for x in a["states"])
+        ran = model.run(at, rate, command(start, stop, "gains"), dt, before, lasting)
         found.append(ran - log)
     return _Run(r["name"], start * dt, np.arange(stop - start + 1) * dt, log, found)
 

@@ -62,11 +62,16 @@ impl Effect for LegInertia {
     }
 }
 
+/// Most of `Izz` over what `Ixx` leaves for it. A leg is slender, and it hardly turns about its axis: forces say next to
+/// nothing of `Izz`, and what a fit says of it may be anything.
+const SLENDER: f64 = 0.1;
+
 /// Shares between cylinder and rod of each leg what forces cannot tell apart, so that both can exist where any two can.
 ///
 /// A cylinder turns about a point that stays where it is, and the rod turns with it: the mass of the cylinder counts for
 /// nothing, and of `Ixx` and `Izz` only the sums do. With `m`, `h` the rod's mass and first moment and `h_c` that of the
-/// cylinder, bodies exist if `Ixx − h²/m > Izz/2` for both; what the sum has more than that is shared.
+/// cylinder, bodies exist if `Ixx − h²/m > Izz/2` for the rod and the same holds with `h_c` for the cylinder. Of what the sum
+/// has more than that the cylinder gets the larger part: it need not be heavy then.
 fn share(robot: &mut Robot) {
     let named = |kind: &str, i: usize| {
         let name = format!("{kind}{i}");
@@ -79,21 +84,21 @@ fn share(robot: &mut Robot) {
         let both = [cylinder, rod].map(|b| robot.bodies[b].inertia.0);
         let [across, along] = [4, 9].map(|k| both[0][k] + both[1][k]);
         let (mass, moment, of_cylinder) = (both[1][0], both[1][3], both[0][3]);
-        let room = across - 0.5 * along - moment * moment / mass;
-        if !(mass > 0.0 && along >= 0.0 && room > 0.0) {
+        let own = moment * moment / mass;
+        let most = across - own;
+        if !(mass > 0.0 && most > 0.0) {
             continue;
         }
-        for (b, a, own) in [
-            (cylinder, 0.5 * room, 0.0),
-            (rod, 0.5 * room, moment * moment / mass),
-        ] {
+        let along = along.clamp(0.0, SLENDER * most);
+        let room = most - 0.5 * along;
+        for (b, across) in [(cylinder, 0.8 * room), (rod, 0.2 * room + own)] {
             let i = &mut robot.bodies[b].inertia.0;
-            i[4] = a + own + 0.25 * along;
+            i[4] = across + 0.25 * along;
             i[7] = i[4];
             i[9] = 0.5 * along;
         }
-        // the mass that leaves it half of its room
-        robot.bodies[cylinder].inertia.0[0] = 4.0 * of_cylinder * of_cylinder / room;
+        // the mass that leaves it half of its part
+        robot.bodies[cylinder].inertia.0[0] = of_cylinder * of_cylinder / (0.4 * room);
     }
 }
 
