@@ -105,6 +105,21 @@ def test_a_parallel_robot_in_mujoco(mass):
         assert h["shrink"] > 0.9, h
 
 
+def test_legs_that_were_left_out():
+    """Forces leave open how cylinder and rod share their inertia; what is written can exist and closes the gap."""
+    pytest.importorskip("mujoco")
+    here = Path(__file__).resolve().parents[2]
+    motion = excite.Trajectory.read(here / "trajectories/hexapod/trajectory.json")
+    heavy, light = hexapod(True), hexapod(False)
+    logs = [excite.simulate(heavy, motion, periods=2, rate=200, seed=k).record(u, name=u) for k, u in enumerate(("fit", "holdout"))]
+    hidden = excite.Experiment(light, logs)
+    diagnosis = excite.diagnose(hidden, next=False)
+    assert [c["effect"] for c in diagnosis.claims] == ["leg_inertia"]
+    assert "robot.toml" in diagnosis.files and diagnosis.robot.joints == light.joints
+    found = excite.verify(hidden, diagnosis=diagnosis, horizons=(0.3,), runs=2)
+    assert found.claimed > 0.9 and found.shrink > 0.9 * found.claimed
+
+
 def integrate(robot):
     """A simulator of one's own: forward dynamics by the equations of the package."""
     from excite._command import mass

@@ -167,7 +167,7 @@ fn check(python: &str, name: &str, m: Mechanism, push: f64) {
         rate = rate.max(line[1]);
         left = left.max(line[2] / size);
         let slow = |a: &usize| tree.at(*a, s)[1].abs() < SLOW;
-        if push != 0.0 && plant.actuated().iter().any(|a| slow(a)) {
+        if push != 0.0 && plant.actuated().iter().any(slow) {
             continue;
         }
         compared += 1;
