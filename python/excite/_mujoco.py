@@ -59,14 +59,14 @@ class Model:
         self._joints = [] if self._legs else [self._model.joint(j) for j in joints]
         self._at = np.array([int(j.qposadr[0]) for j in self._joints], int)
         self._dof = np.array([int(j.dofadr[0]) for j in self._joints], int)
-        # a state is that of all joints; legs that are tendons have none
-        self._driven_states = [] if tree is None else [tree.index(j) for j in joints]
-        known = range(len(joints)) if tree is None else [k for k, j in enumerate(tree) if self._has(j)]
-        self._known = np.array(list(known), int)
-        states = self._joints if tree is None else [self._model.joint(tree[k]) for k in known]
+        # a state is that of all joints; legs that are tendons have none in the model
+        self._tree = joints if tree is None else tree
+        self._known = np.array([k for k, j in enumerate(self._tree) if self._has(j)], int)
+        states = [self._model.joint(self._tree[k]) for k in self._known]
         self._states_at = np.array([int(j.qposadr[0]) for j in states], int)
         self._states_dof = np.array([int(j.dofadr[0]) for j in states], int)
-        self._all = len(joints) if tree is None else len(tree)
+        self._of_drives = [self._tree.index(j) for j in joints]
+        #: length of each leg less the position of its drive
         self._zero = np.zeros(len(self._legs))
         bits = mj.mjtDisableBit
         # limits and contacts are not what is compared
@@ -188,7 +188,7 @@ class Model:
         for k in sorted(range(len(records)), key=lambda k: int(records[k]["order"])):
             r = records[k]
             if self._closed:
-                out[k] = self.closing(*(from_columns(r[f"tree_{n}"], self._all) for n in ("q", "dq", "ddq")))
+                out[k] = self.closing(*(from_columns(r[f"tree_{n}"], len(self._tree)) for n in ("q", "dq", "ddq")))
                 continue
             q, dq, ddq = (from_columns(r[name], joints) for name in ("q", "dq", "ddq"))
             self.begins[int(r["order"])] = {key: memory[key] for key in self.lasting if key in memory}
@@ -245,7 +245,7 @@ class Model:
         data.qpos[self._states_at], data.qvel[self._states_dof] = q[self._known], dq[self._known]
         self._mj.mj_forward(self._model, data)
         if self._legs:
-            self._zero = data.ten_length[self._legs] - q[self._driven_states]
+            self._zero = data.ten_length[self._legs] - q[self._of_drives]
 
     def _read(self, data: Any) -> "Tuple[Array, Array]":
         if self._legs:

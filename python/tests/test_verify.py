@@ -79,19 +79,24 @@ def hexapod(mass):
     return excite.Robot._from_files({"robot.toml": 'prior = "identified"\n' + text}, "robot.toml")
 
 
+def recorded(robot, model, **settings):
+    """A record to fit and one held out of a hexapod, for a model of it."""
+    here = Path(__file__).resolve().parents[2]
+    motion = excite.Trajectory.read(here / "trajectories/hexapod/trajectory.json")
+    logs = [
+        excite.simulate(robot, motion, periods=2, rate=200, seed=k, **settings).record(use, name=use, payload=None)
+        for k, use in enumerate(("fit", "holdout"))
+    ]
+    return excite.Experiment(model, logs)
+
+
 @pytest.mark.parametrize("mass", [True, False])
 def test_a_parallel_robot_in_mujoco(mass):
     """Legs are closed by constraints, or are tendons where they weigh nothing; a hidden load shows in both."""
     pytest.importorskip("mujoco")
     robot = hexapod(mass)
-    here = Path(__file__).resolve().parents[2]
-    motion = excite.Trajectory.read(here / "trajectories/hexapod/trajectory.json")
     load = (7.0, 0.14, -0.21, 0.7, 0.1113, 0.0042, -0.014, 0.1078, 0.021, 0.0651)
-    logs = [
-        excite.simulate(robot, motion, periods=2, rate=200, payload=load, seed=k).record(use, name=use, payload=None)
-        for k, use in enumerate(("fit", "holdout"))
-    ]
-    hidden = excite.Experiment(robot, logs)
+    hidden = recorded(robot, robot, payload=load)
     diagnosis = excite.diagnose(hidden, next=False)
     xml = diagnosis.files["robot.xml"]
     assert ("<tendon>" in xml) != mass and ("<connect " in xml) == mass
@@ -108,11 +113,8 @@ def test_a_parallel_robot_in_mujoco(mass):
 def test_legs_that_were_left_out():
     """Forces leave open how cylinder and rod share their inertia; what is written can exist and closes the gap."""
     pytest.importorskip("mujoco")
-    here = Path(__file__).resolve().parents[2]
-    motion = excite.Trajectory.read(here / "trajectories/hexapod/trajectory.json")
-    heavy, light = hexapod(True), hexapod(False)
-    logs = [excite.simulate(heavy, motion, periods=2, rate=200, seed=k).record(u, name=u) for k, u in enumerate(("fit", "holdout"))]
-    hidden = excite.Experiment(light, logs)
+    light = hexapod(False)
+    hidden = recorded(hexapod(True), light)
     diagnosis = excite.diagnose(hidden, next=False)
     assert [c["effect"] for c in diagnosis.claims] == ["leg_inertia"]
     assert "robot.toml" in diagnosis.files and diagnosis.robot.joints == light.joints

@@ -2,8 +2,8 @@
 //!
 //! A platform hangs on its task coordinates, whose joints have no drive and whose carriers weigh a milligram; legs and rods
 //! hang on the base. Where the end of a leg or rod meets the platform, a `connect` holds two sites together; the closures of
-//! `loops` are `connect` (position) and `weld` (pose); [legs without mass](legs) are tendons. Sites, because a point of the second body would follow from the
-//! posture at zero, in which the loops are open; the keyframe `home` closes them.
+//! `loops` are `connect` (position) and `weld` (pose); `legs` without mass are tendons. Sites, because a point of the second
+//! body would follow from the posture at zero, in which the loops are open; the keyframe `home` closes them.
 //!
 //! Where a rod ends is found from the model itself: the point of its axis that stays where it is in the frame of the
 //! platform, or of one of its bars, while these move.
@@ -11,8 +11,8 @@
 mod legs;
 
 use super::mujoco::body::{kind, open, placement};
-use super::mujoco::followers;
 use super::mujoco::joint::OnJoint;
+use super::mujoco::{followers, stiff};
 use super::{Format, Model, Part, breakaway, escape, remark, xml_comment};
 use crate::collision::scene::poses;
 use crate::error::{Error, Result};
@@ -32,8 +32,6 @@ pub struct Closed;
 const STEP: f64 = 5e-4;
 /// Stiffness and damping ratio of the constraints: the shortest time that the step allows.
 const REFERENCE: &str = "solref=\"0.001 1\" solimp=\"0.999 0.9999 0.0001\"";
-/// The shortest reference of dry friction.
-const DRY: &str = "solreffriction=\"0.0001 1\" solimpfriction=\"0.99 0.99 0.001\"";
 /// How far a point of a rod may move in the frame of what it is fixed to, of the robot's size.
 const FIXED: f64 = 1e-7;
 /// How far home is left to see what moves with what, m and rad.
@@ -197,19 +195,19 @@ fn ends(mechanism: &Mechanism) -> Result<Vec<Join>> {
 
 fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join], legs: Option<&Legs>) -> String {
     let mut out = String::new();
-    let g = robot.gravity;
+    let (g, dry) = (robot.gravity, stiff());
     let _ = writeln!(
         out,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
          <option timestep=\"{STEP}\" gravity=\"{} {} {}\" integrator=\"implicitfast\"/>\n  <default>\n    \
-         <joint {DRY}/>\n    {}\n  </default>",
+         <joint {dry}/>\n    {}\n  </default>",
         escape(&robot.name),
         g.x,
         g.y,
         g.z,
         match legs {
             None => format!("<equality {REFERENCE}/>"),
-            Some(_) => format!("<tendon {DRY}/>"),
+            Some(_) => format!("<tendon {dry}/>"),
         }
     );
     out += "  <worldbody>\n";

@@ -45,8 +45,8 @@ pub use butterworth::Butterworth;
 #[doc(hidden)]
 pub use decimate::Decimator;
 pub(crate) use parts::{Derivation, Periods};
-#[doc(hidden)]
 pub(crate) use prepare::mean;
+#[doc(hidden)]
 pub use prepare::{averaged, common_cutoff};
 
 use crate::dynamics::Samples;

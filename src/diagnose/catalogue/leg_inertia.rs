@@ -1,6 +1,8 @@
 //! Legs or forearms of a parallel robot whose inertia the model leaves out.
 
 use super::*;
+use crate::export;
+use crate::robot::Inertia;
 use crate::robot::inertia::UNITS;
 
 /// Neglected leg inertia.
@@ -40,7 +42,9 @@ impl Effect for LegInertia {
                     .for_each(|k| robot.bodies[*b].inertia.0[*k] += eta);
             }
         }
-        if unknowns(cx).iter().any(|u| u.name == "cylinder_m") {
+        // what the model knows of a part is not shared out
+        let unknown = |name| unknowns(cx).iter().any(|u| u.name == name);
+        if unknown("cylinder_m") && unknown("rod_m") {
             share(robot);
         }
         Some(Part::Bodies)
@@ -66,7 +70,8 @@ impl Effect for LegInertia {
 /// nothing of `Izz`, and what a fit says of it may be anything.
 const SLENDER: f64 = 0.1;
 
-/// Shares between cylinder and rod of each leg what forces cannot tell apart, so that both can exist where any two can.
+/// Shares between cylinder and rod of each leg what forces cannot tell apart, so that both can exist where any two can. Legs
+/// that can exist, or are no bodies of revolution, stay as they are.
 ///
 /// A cylinder turns about a point that stays where it is, and the rod turns with it: the mass of the cylinder counts for
 /// nothing, and of `Ixx` and `Izz` only the sums do. With `m`, `h` the rod's mass and first moment and `h_c` that of the
@@ -81,7 +86,14 @@ fn share(robot: &mut Robot) {
         .map_while(|i| Some([named("cylinder", i)?, named("rod", i)?]))
         .collect();
     for [cylinder, rod] in legs {
-        let both = [cylinder, rod].map(|b| robot.bodies[b].inertia.0);
+        let both = [cylinder, rod].map(|b| robot.bodies[b].inertia);
+        let exists = |i: &Inertia| i.mass() > 0.0 && export::possible(i) == *i;
+        let turned =
+            |Inertia(i): &Inertia| i[4] == i[7] && [1, 2, 5, 6, 8].iter().all(|k| i[*k] == 0.0);
+        if both.iter().all(exists) || !both.iter().all(turned) {
+            continue;
+        }
+        let both = both.map(|i| i.0);
         let [across, along] = [4, 9].map(|k| both[0][k] + both[1][k]);
         let (mass, moment, of_cylinder) = (both[1][0], both[1][3], both[0][3]);
         let own = moment * moment / mass;
@@ -206,11 +218,11 @@ mod tests {
             }
         }
         let before = plant::Plant::from(m.clone());
-        assert!(!crate::export::impossible(&before, before.robot()).is_empty());
+        assert!(!export::impossible(&before, before.robot()).is_empty());
         share(&mut m.robot);
         let after = plant::Plant::from(m);
         assert_eq!(
-            crate::export::impossible(&after, after.robot()),
+            export::impossible(&after, after.robot()),
             Vec::<usize>::new()
         );
         let x = before.random_states(50, 3);
@@ -219,5 +231,23 @@ mod tests {
         for (a, b) in tau[0].iter().zip(&tau[1]) {
             assert!((a - b).abs() < 1e-11 * largest, "{a} {b}");
         }
+    }
+
+    /// Legs that can exist are left as they were found, and so are those that are no bodies of revolution.
+    #[test]
+    fn legs_that_need_no_sharing_stay_as_they_are() {
+        let plant = plant::Plant::load("hexapod").unwrap();
+        let mut robot = plant.robot().clone();
+        share(&mut robot);
+        let inertias = |r: &Robot| r.bodies.iter().map(|b| b.inertia).collect::<Vec<_>>();
+        assert!(inertias(&robot) == inertias(plant.robot()));
+        for b in &mut robot.bodies {
+            if b.name.starts_with("cylinder") {
+                b.inertia = Inertia([0.0, 0.0, 0.0, 1.1, 0.7, 0.0, 0.0, 0.6, 0.0, 0.01]);
+            }
+        }
+        let crooked = inertias(&robot);
+        share(&mut robot);
+        assert!(inertias(&robot) == crooked);
     }
 }

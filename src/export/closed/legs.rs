@@ -28,32 +28,21 @@ impl Legs {
         if !matches!(mechanism.source, Source::GoughStewart) {
             return None;
         }
-        let home = mechanism.inverse(&mechanism.home).ok()?;
+        let light = |b: &usize| {
+            let body = &robot.bodies[*b];
+            let driven = mechanism.actuated.contains(&body.coordinate);
+            let terms = &robot.joints[body.coordinate].terms;
+            let bare = driven || terms.iter().all(|t| *t == 0.0);
+            bare && body.inertia.0.iter().all(|x| *x == 0.0)
+        };
         let of = |join: &Join| {
             let rod = join.sites[0].body?;
-            let light = |b: usize| {
-                let body = &robot.bodies[b];
-                let driven = mechanism.actuated.contains(&body.coordinate);
-                let bare = robot.joints[body.coordinate]
-                    .terms
-                    .iter()
-                    .all(|t| *t == 0.0);
-                body.inertia.0.iter().all(|x| *x == 0.0) && (driven || bare)
-            };
             let chain: Vec<usize> =
                 std::iter::successors(Some(rod), |b| robot.bodies[*b].parent).collect();
-            let first = *chain.last()?;
-            let coordinate = robot.bodies[rod].coordinate;
-            // all origins lie on the axis of the drive
-            let between = chain.iter().filter(|b| **b != first);
-            let apart: f64 = between.map(|b| robot.bodies[*b].position.norm()).sum();
-            let zero = apart + robot.bodies[rod].offset + join.sites[0].position.z;
-            let straight =
-                mechanism.actuated.contains(&coordinate) && home[coordinate] + zero > 0.0;
-            (chain.into_iter().all(light) && straight).then_some(Leg {
-                coordinate,
-                first,
-                zero,
+            chain.iter().all(light).then_some(Leg {
+                coordinate: robot.bodies[rod].coordinate,
+                first: *chain.last()?,
+                zero: robot.bodies[rod].offset,
             })
         };
         let legs: Vec<Leg> = joins.iter().map(of).collect::<Option<_>>()?;
