@@ -14,7 +14,7 @@ use excite::log::{Channels, Experiment, Record};
 use excite::plant::Plant;
 use excite::regressor::nominal_torque;
 use excite::robot::Inertia;
-use excite::robot::parts::JointTerm;
+use excite::robot::parts::{JointTerm, Prior};
 use excite::trajectory::Fourier;
 use excite::trajectory::parts::Series;
 use rand::Rng;
@@ -412,6 +412,37 @@ fn a_known_load_is_no_gap() {
     // where nothing states it, it is found to be in these records, and not in the robot
     carries(&bare, 0.8);
     assert!(empty.findings.iter().all(|f| f.records.is_empty()));
+}
+
+/// A load that is looked for nearer than it is gets no name, and the report says what it would have been.
+#[test]
+fn a_load_out_of_reach_is_ruled_out_and_said() {
+    let mut machine = robots().1;
+    let com = nalgebra::Vector3::new(1.1, 0.3, 0.0);
+    let load = Inertia::from_com(0.8, com, nalgebra::Matrix3::zeros());
+    let mut model = robots().0.robot().clone();
+    model.prior = Prior::Identified;
+    for (k, body) in machine.bodies.iter_mut().enumerate() {
+        body.inertia = model.bodies[k].inertia;
+        if k == 1 {
+            body.inertia
+                .0
+                .iter_mut()
+                .zip(load.0)
+                .for_each(|(b, l)| *b += l);
+        }
+    }
+    let logs = logs_of([&machine; 4], &mut |_, _, _, _, _| 0.0);
+    let settings = Settings::default().with(|set| set.next = false);
+    let d = of_logs(&Plant::from(model), &logs, &settings, &|_| {}).expect("a diagnosis");
+    assert!(
+        claims(&d).iter().all(|c| c.0 != "payload"),
+        "{:?}",
+        claims(&d)
+    );
+    let ruled = d.ruled_out.iter().find(|r| r.effect == "payload");
+    let why = &ruled.expect("a load that was ruled out").why;
+    assert!(why.starts_with("its centre of mass would be 1.1"), "{why}");
 }
 
 /// The first finding is a load of this mass in some of the records.

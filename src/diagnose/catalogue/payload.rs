@@ -76,8 +76,7 @@ impl Effect for Payload {
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        let reach = (eta[1].powi(2) + eta[2].powi(2) + eta[3].powi(2)).sqrt();
-        eta[0] > 0.0 && reach < 0.8 * eta[0]
+        eta[0] > 0.0
     }
 
     fn impossible(
@@ -89,11 +88,19 @@ impl Effect for Payload {
     ) -> Option<String> {
         let bodies = cx.data.plant.robot().bodies.iter();
         let own: f64 = bodies.map(|b| b.inertia.mass()).sum();
-        (own > 0.0 && eta[0] > HEAVIEST * own).then(|| {
-            format!(
+        let away = eta[1].hypot(eta[2]).hypot(eta[3]) / eta[0];
+        if own > 0.0 && eta[0] > HEAVIEST * own {
+            return Some(format!(
                 "it would be a load of {} kg on a robot whose moving parts have {} kg",
                 significant(eta[0], 3),
                 significant(own, 3)
+            ));
+        }
+        let reach = T.carried.reach;
+        (away > reach).then(|| {
+            format!(
+                "its centre of mass would be {} m from the frame that carries it, and loads are looked for within {reach} m",
+                significant(away, 3)
             )
         })
     }
