@@ -19,6 +19,7 @@
 //! the best single load does, by [`T.carried.beyond`](super::thresholds). Records that share one unknown load, found or stated, are then
 //! asked once more: what does a load of its own explain of what one load leaves?
 
+use super::catalogue::away;
 use super::column::Column;
 use super::data::Data;
 use super::decoy;
@@ -201,10 +202,8 @@ impl<'d> Trials<'d> {
             .collect();
         let projected = self.evidence.project(&own);
         let fit = self.evidence.fit(&[&projected]);
-        let able = fit.eta.chunks_exact(LOAD).all(|eta| {
-            let lever = (eta[1].powi(2) + eta[2].powi(2) + eta[3].powi(2)).sqrt();
-            eta[0] > 0.0 && lever < T.carried.reach * eta[0]
-        });
+        let mut loads = fit.eta.chunks_exact(LOAD);
+        let able = loads.all(|eta| eta[0] > 0.0 && away(eta) < T.carried.reach);
         Trial {
             gain: fit.gain - self.before,
             fit,

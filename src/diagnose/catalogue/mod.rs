@@ -43,6 +43,7 @@ mod viscous_friction;
 
 pub use context::Context;
 pub use estimate::{Estimate, Place, Quantity, Shape, Value};
+pub(super) use payload::away;
 
 use super::chain;
 use super::column::Column;

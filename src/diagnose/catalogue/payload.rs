@@ -88,7 +88,6 @@ impl Effect for Payload {
     ) -> Option<String> {
         let bodies = cx.data.plant.robot().bodies.iter();
         let own: f64 = bodies.map(|b| b.inertia.mass()).sum();
-        let away = eta[1].hypot(eta[2]).hypot(eta[3]) / eta[0];
         if own > 0.0 && eta[0] > HEAVIEST * own {
             return Some(format!(
                 "it would be a load of {} kg on a robot whose moving parts have {} kg",
@@ -96,7 +95,7 @@ impl Effect for Payload {
                 significant(own, 3)
             ));
         }
-        let reach = T.carried.reach;
+        let (away, reach) = (away(eta), T.carried.reach);
         (away > reach).then(|| {
             format!(
                 "its centre of mass would be {} m from the frame that carries it, and loads are looked for within {reach} m",
@@ -120,6 +119,11 @@ impl Effect for Payload {
             value("com_z", z, sz, "m"),
         ]
     }
+}
+
+/// Distance of the centre of mass from the frame that carries the load, from its mass and first moments, m.
+pub fn away(eta: &[f64]) -> f64 {
+    eta[1].hypot(eta[2]).hypot(eta[3]) / eta[0]
 }
 
 /// The load as a body.

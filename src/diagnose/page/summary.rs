@@ -80,7 +80,7 @@ pub(super) fn limits(d: &Diagnosis) -> Markup {
                 ]).collect::<Vec<_>>())))
         }
         @if !d.ruled_out.is_empty() {
-            p { "These would explain a part of the gap, with values that no machine can have. They are no explanation:" }
+            p { "These would explain a part of the gap, with values that no machine can have or that are not looked for. They are not named, for the reason beside each:" }
             ul { @for r in &d.ruled_out {
                 li { (r.title) @if !r.joints.is_empty() { " on " (r.joints.join(" and ")) } ": " (r.why) "." }
             } }
