@@ -50,3 +50,14 @@ def test_mujoco_leaves_what_we_leave(name):
         # where a joint stands still, friction is no more wrong there than here
         measured = np.array(r["measured"])
         assert np.linalg.norm(theirs[measured]) < 1.02 * np.linalg.norm(ours[measured])
+
+
+@pytest.mark.parametrize("name", ["panda", "tx40"])
+def test_the_band_of_the_posterior_covers_what_was_held_out(name):
+    experiment = excite.Experiment.read(recording(name))
+    found = excite.identify(experiment).sample(50, seed=1).coverage(experiment)
+    print(name, found["covered"], [(j["joint"], round(j["covered"], 3)) for j in found["joints"]])
+    assert 0.90 <= found["covered"] <= 0.97
+    assert all(j["covered"] > 0.85 for j in found["joints"])
+    # narrower than ±20 % on everything
+    assert found["width"] < 0.5
