@@ -70,6 +70,30 @@ impl Data<'_> {
         })
     }
 
+    /// What the dry friction of actuator `j` of another simulator may be off by about reversals, by newton metre or newton
+    /// of friction, and how far each is expected to go: from the sign of the velocity at a sample to its mean over the
+    /// samples beside it, as torque is logged, and what else this file allows for. Nothing where there is no dry friction
+    /// of the actuator's own.
+    pub(super) fn at_reversals(&self, j: usize) -> Option<([Vec<f64>; 4], [f64; 4])> {
+        let coulomb = self.plant.actuators()[j].terms[2].abs();
+        if coulomb == 0.0 || self.plant.redundant() {
+            return None;
+        }
+        let at_samples = self.records.iter().flat_map(|r| r.state(j).1.iter());
+        let sharp = T.reversals.sharp * self.speed[j];
+        let mean = self.dry_sign(j, self.lead);
+        let change = mean
+            .iter()
+            .zip(at_samples)
+            .map(|(m, v)| m - sign(*v, sharp));
+        let spread = T.reversals.rounding * coulomb;
+        let [a, b, c] = self.rounded(j);
+        Some((
+            [change.collect(), a, b, c],
+            [coulomb, spread, spread, spread],
+        ))
+    }
+
     /// Coulomb columns with the sign averaged as the torque is.
     pub(super) fn coulomb(&mut self) {
         for (j, c) in self.dry_parameters() {
