@@ -31,23 +31,21 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// From records with the window and the lead found so far.
-    pub fn of(data: &Data) -> Channel {
+    /// From records with the window and the lead found so far; with `leads` another lead is looked for.
+    pub fn of(data: &Data, leads: bool) -> Channel {
         let e = Evidence::new(data, 1.0);
         let phi = e.parameters(&[], &e.fit(&[]));
         let model = data.model_torque(&phi);
         let curved = data.curvature(&model);
         let joints = || 0..data.joints();
         let coarse = joints().any(|j| data.filtered(j));
-        let assumed = joints().any(|j| data.noise[j].assumed);
         // positions that noise is on bend where the torque does not: no window can be seen then
         let found = match coarse {
             true => 0.0,
             false => e.fit(&[&e.project(std::slice::from_ref(&curved))]).eta[0],
         };
         let mut lead = data.lead;
-        // no machine's friction does that: looked for where a log may be a simulator's
-        if (coarse || assumed) && data.may_lead() {
+        if leads {
             let step = T.reversals.step;
             let all = e.project(&[curved, data.slope(&model), data.earlier(&phi, step)]);
             let fit = e.fit(&[&all]);
@@ -75,6 +73,27 @@ fn window(found: f64) -> f64 {
 }
 
 impl Data<'_> {
+    /// Takes dry friction to reverse as early as the records show; whether it does. No machine's friction does so by more
+    /// than some milliseconds, so less counts only where the log looks like a simulator's: coarse encoders, or no noise.
+    pub fn find_lead(&mut self) -> bool {
+        if !self.may_lead() {
+            return false;
+        }
+        for _ in 0..T.reversals.rounds {
+            let lead = Channel::of(self, true).lead;
+            let done = (lead - self.lead).abs() < T.reversals.settled;
+            self.reverse_early(lead);
+            if done {
+                break;
+            }
+        }
+        let plain = (0..self.joints()).any(|j| self.filtered(j) || self.noise[j].assumed);
+        if !plain && self.lead < T.reversals.early {
+            self.reverse_early(0.0);
+        }
+        plain || self.lead > 0.0
+    }
+
     /// A modelled signal of all records as the torque channel would show it, whitened.
     pub fn modelled(&self, j: usize, x: &[f64]) -> Vec<f64> {
         if self.window == 0.0 && !self.filtered(j) {

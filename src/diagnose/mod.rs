@@ -118,8 +118,9 @@ fn prepare_with<'a>(plant: &'a Plant, logs: &[log::Record], loads: Loads) -> Res
     data.ordinary();
     data.carry(loads)?;
     // what the log makes of a torque, then what the encoders cannot resolve
+    let leads = data.find_lead();
     for pass in 0..2 {
-        let channel = Channel::of(&data);
+        let channel = Channel::of(&data, leads);
         data.window = channel.window;
         data.reverse_early(channel.lead);
         if pass == 0 {

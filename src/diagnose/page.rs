@@ -49,7 +49,16 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             _ => claims.iter().map(each).collect::<Vec<_>>().join("; "),
         }
     };
-    let left = percent(d.unexplained);
+    let held = d.holdout.map(|[before, after]| after / before.max(1e-9));
+    // what stays where nothing was fitted is said where it is clearly more
+    let left = match held.filter(|h| *h > d.unexplained + 0.1) {
+        Some(held) => format!(
+            "{} of the gap stays, on records held out {}",
+            percent(d.unexplained),
+            percent(held.min(1.0))
+        ),
+        None => format!("{} of the gap stays", percent(d.unexplained)),
+    };
     match d.verdict {
         Verdict::NoGap => (
             Tone::Good,
@@ -57,16 +66,16 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         ),
         Verdict::Explained if sure => (
             Tone::Good,
-            format!("Explained: {}. {left} of the gap stays.", names()),
+            format!("Explained: {}. {left}.", names()),
         ),
         Verdict::Explained => (
             Tone::Fair,
-            format!("Probably explained: {}. {left} of the gap stays.", names()),
+            format!("Probably explained: {}. {left}.", names()),
         ),
         Verdict::PartlyExplained => (
             Tone::Fair,
             format!(
-                "{}: {}. Something remains: {left} of the gap.",
+                "{}: {}. Something remains: {left}.",
                 if sure {
                     "Partly explained"
                 } else {

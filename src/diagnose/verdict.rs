@@ -113,11 +113,17 @@ pub fn decide(
     // a set that cannot be told apart explains as well as its one right member
     let claimed = members.iter().any(claims);
     let shows = stands_out(&st, &before);
+    let explains = |stays: f64, stands_out: bool| !stands_out || stays <= T.gap.unexplained;
+    let held = held_out(&st, &hold_after);
     let verdict = match (shows || surprising, claimed) {
         (false, false) => Verdict::NoGap,
         (_, false) => Verdict::Unknown,
-        _ if stands_out(&st, &after) && unexplained > T.gap.unexplained => Verdict::PartlyExplained,
-        _ => Verdict::Explained,
+        _ if explains(unexplained, stands_out(&st, &after))
+            && explains(st.above(&hold_after, false) / base_held.max(1e-9), held) =>
+        {
+            Verdict::Explained
+        }
+        _ => Verdict::PartlyExplained,
     };
     Decision {
         verdict,
@@ -133,6 +139,13 @@ pub fn decide(
 fn stands_out(st: &State, gap: &[f64]) -> bool {
     let least = T.gap.sound * st.evidence.data.fitted as f64;
     gap.iter().zip(&st.allowance).any(|(v, a)| *v > least * a)
+}
+
+/// Whether the gap of any joint on records held out is far above the noise.
+fn held_out(st: &State, gap: &[f64]) -> bool {
+    let rows = st.evidence.data.rows() - st.evidence.data.fitted;
+    let least = T.gap.held_out * rows as f64;
+    st.evidence.data.predicts() && gap.iter().any(|v| *v > least)
 }
 
 /// Gives the members, in the order of the set, their coefficients of the common fit.

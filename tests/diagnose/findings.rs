@@ -445,6 +445,49 @@ fn a_load_out_of_reach_is_ruled_out_and_said() {
     assert!(why.starts_with("its centre of mass would be 1.1"), "{why}");
 }
 
+/// Logs of a sound machine whose dry friction reverses `lead` seconds before the velocity does.
+fn reversing_early(lead: f64) -> Vec<Record> {
+    let machine = robots().1;
+    let records = [
+        (4.0, true, true),
+        (9.0, true, true),
+        (5.0, false, true),
+        (4.5, false, false),
+    ];
+    let of = |(k, (period, odd, fit)): (usize, &(f64, bool, bool))| {
+        let f = motion(*period, *odd, k as u64);
+        let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let mut early = |j: usize, t: f64, _: &[f64], now: &[f64], _: f64| {
+            f.evaluate(t + lead, [&mut q, &mut v, &mut a]);
+            machine.joints[j].terms[2] * (v[j].signum() - now[j].signum())
+        };
+        log(&machine, &f, *fit, 50 + k as u64, &mut early)
+    };
+    records.iter().enumerate().map(of).collect()
+}
+
+/// A simulator's friction opposes `q̇ + T q̈`. That is the simulator's, and no delay of the torque.
+#[test]
+fn friction_that_reverses_early_is_a_simulators() {
+    let plant = robots().0;
+    let lead = |seconds: f64| {
+        let logs = reversing_early(seconds);
+        prepare(&plant, &logs).expect("records").lead
+    };
+    assert!((lead(0.0095) - 0.0095).abs() < 0.001, "{}", lead(0.0095));
+    // what a machine may have
+    assert_eq!(lead(0.003), 0.0);
+    assert_eq!(lead(0.0), 0.0);
+    let settings = Settings::default().with(|set| set.next = false);
+    let d = of_logs(&plant, &reversing_early(0.0095), &settings, &|_| {}).expect("a diagnosis");
+    assert_eq!(
+        (claims(&d), d.verdict),
+        (vec![], Verdict::NoGap),
+        "{:?}",
+        d.findings
+    );
+}
+
 /// What a simulator's reversals are sharper than those of the log does not count when its torques are judged, as it does
 /// not in the diagnosis; any other error does.
 #[test]

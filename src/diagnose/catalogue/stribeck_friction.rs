@@ -47,8 +47,14 @@ impl Effect for StribeckFriction {
         vec![Column::on(j, cx.data.dry(j, |_, v| rise(v)))]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > 0.0
+    // a fit about reversals can ask for many times what slides
+    fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
+        let coulomb = cx.data.plant.actuators()[place.first()].terms[2].abs();
+        let most = match coulomb > 0.0 {
+            true => T.reversals.breakaway * coulomb,
+            false => f64::INFINITY,
+        };
+        eta[0] > 0.0 && eta[0] < most
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {

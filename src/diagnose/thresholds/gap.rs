@@ -26,6 +26,9 @@ pub struct Gap {
     pub left: f64,
     /// Share of the gap that may stay in a gap that counts as explained. Unit: share. Source: by hand.
     pub unexplained: f64,
+    /// Gap per row of a joint on records held out from which on the share that stays there counts, too. Unit: noise
+    /// variances. Source: by hand.
+    pub held_out: f64,
     /// Lags that the autocorrelation of a residual is summed over. Unit: samples. Source: by hand.
     pub lags: usize,
 }
@@ -38,6 +41,7 @@ pub(super) const GAP: Gap = Gap {
     slack_share: 0.3,
     left: 1.0,
     unexplained: 0.15,
+    held_out: 4.0,
     lags: 20,
 };
 

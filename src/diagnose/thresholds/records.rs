@@ -159,8 +159,18 @@ pub struct Reversals {
     pub shortest: f64,
     /// Longest such time. Unit: s. Source: three times what MuJoCo's default gives.
     pub longest: f64,
+    /// Least such time that counts in a log that does not look like a simulator's. Unit: s. Source: MuJoCo's default gives
+    /// 9.5 ms, the largest of eight logs of machines and of other simulators 4.2 ms (the EMPS).
+    pub early: f64,
+    /// Change of such a time below which it is not looked for again. Unit: s. Source: by hand.
+    pub settled: f64,
+    /// Rounds in which it is looked for. Unit: count. Source: by hand.
+    pub rounds: usize,
     /// Least such time over its deviation. Unit: standard deviations. Source: by hand.
     pub sure: f64,
+    /// Most that friction may rise towards standstill, over the dry friction of the model. Unit: ratio. Source: by hand;
+    /// breakaway friction of drives is up to twice what slides (Armstrong-Hélouvry, Dupont & Canudas de Wit 1994).
+    pub breakaway: f64,
     /// Time by which velocities from positions are blurred. Unit: s. Source: by hand.
     pub blur: f64,
 }
@@ -176,7 +186,11 @@ pub(super) const REVERSALS: Reversals = Reversals {
     step: 0.004,
     shortest: 0.002,
     longest: 0.03,
+    early: 0.006,
+    settled: 5e-4,
+    rounds: 5,
     sure: 8.0,
+    breakaway: 4.0,
     blur: 0.015,
 };
 
