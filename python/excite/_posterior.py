@@ -160,12 +160,13 @@ class Posterior:
         left, wide, usual, state = (np.concatenate(x) for x in zip(*parts[True]))
         noise = _near(np.concatenate([p[3] for p in parts[False]]), *_lacking(halves, self.inflation), state)
         inside = np.abs(left) <= factor * np.sqrt(wide**2 + noise**2)
+        spread, width = np.sqrt(np.mean(noise**2, axis=0)), wide.mean(0) / np.maximum(usual.mean(0), 1e-300)
         return {
             "level": level,
             "covered": float(inside.mean()),
             "joints": [
                 {"joint": j, "covered": float(c), "noise": float(n), "width": float(w)}
-                for j, c, n, w in zip(joints, inside.mean(0), np.sqrt(np.mean(noise**2, axis=0)), wide.mean(0) / np.maximum(usual.mean(0), 1e-300))
+                for j, c, n, w in zip(joints, inside.mean(0), spread, width)
             ],
             "width": float(np.mean(wide / noise) / max(np.mean(usual / noise), 1e-300)),
         }

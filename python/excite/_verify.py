@@ -231,6 +231,7 @@ def _torques(
     measured = [mean(lambda k, m=m: energies[m][k]) for m in range(2)]  # type: ignore[misc]
     claimed = [mean(lambda k, key=key: claims[raw["records"][k]["name"]][key]) for key in ("frozen", "explained")]  # type: ignore[misc]
     least = min(CLEAR * math.sqrt(2.0 / sum(lengths[k] // len(joints) for k in places)), 1.0)
+    of_all = least * math.sqrt(len(joints))
     rows = []
     for j, joint in enumerate(joints):
         rows.append(
@@ -247,8 +248,8 @@ def _torques(
         "unit": "variance of the torque noise",
         "noise": raw["noise"],
         "joints": rows,
-        "measured": _shrink(measured[0].sum(), measured[1].sum(), least * math.sqrt(len(joints))),
-        "claimed": _shrink(claimed[0].sum(), claimed[1].sum(), least * math.sqrt(len(joints))),
+        "measured": _shrink(measured[0].sum(), measured[1].sum(), of_all),
+        "claimed": _shrink(claimed[0].sum(), claimed[1].sum(), of_all),
     }
 
 

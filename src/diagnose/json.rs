@@ -187,7 +187,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         },
         "findings": d.findings.iter().map(finding).collect::<Vec<_>>(),
         "unexplained": number(d.unexplained),
-        "holdout_shrink": d.holdout.map(|[a, b]| number(1.0 - b / a.max(1e-9))),
+        "holdout_shrink": d.shrink().map(number),
         "at_rest": d.at_rest.iter().map(|r| json!({
             "record": r.record,
             "use": if r.fit { "fit" } else { "holdout" },

@@ -49,7 +49,7 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             _ => claims.iter().map(each).collect::<Vec<_>>().join("; "),
         }
     };
-    let held = d.holdout.map(|[before, after]| after / before.max(1e-9));
+    let held = d.shrink().map(|gone| 1.0 - gone);
     // what stays where nothing was fitted is said where it is clearly more
     let left = match held.filter(|h| *h > d.unexplained + 0.1) {
         Some(held) => format!(

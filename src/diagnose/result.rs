@@ -99,6 +99,14 @@ pub struct Diagnosis {
     pub window: f64,
 }
 
+impl Diagnosis {
+    /// Share of the gap on holdout records that vanishes with what was found.
+    pub(super) fn shrink(&self) -> Option<f64> {
+        self.holdout
+            .map(|[before, after]| 1.0 - after / before.max(1e-9))
+    }
+}
+
 /// Residuals in units of the noise.
 pub fn scaled(data: &Data, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
     residual

@@ -108,27 +108,24 @@ pub fn decide(
         true => [whole(true), whole(false)],
         false => [st.total, st.above(&hold_before, false)],
     };
+    let held = st.above(&hold_after, false);
     let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
     let surprising = surprise > T.hidden.surprise + T.hidden.per_parameter * st.freedoms;
     // a set that cannot be told apart explains as well as its one right member
     let claimed = members.iter().any(claims);
     let shows = stands_out(&st, &before);
-    let explains = |stays: f64, stands_out: bool| !stands_out || stays <= T.gap.unexplained;
-    let held = held_out(&st, &hold_after);
+    let remains = stands_out(&st, &after) && unexplained > T.gap.unexplained
+        || held_out(&st, &hold_after) && held / base_held.max(1e-9) > T.gap.unexplained;
     let verdict = match (shows || surprising, claimed) {
         (false, false) => Verdict::NoGap,
         (_, false) => Verdict::Unknown,
-        _ if explains(unexplained, stands_out(&st, &after))
-            && explains(st.above(&hold_after, false) / base_held.max(1e-9), held) =>
-        {
-            Verdict::Explained
-        }
-        _ => Verdict::PartlyExplained,
+        _ if remains => Verdict::PartlyExplained,
+        _ => Verdict::Explained,
     };
     Decision {
         verdict,
         members,
-        holdout: [base_held, st.above(&hold_after, false)],
+        holdout: [base_held, held],
         surprise: [surprise, surprise_after],
         unexplained,
         stands_out: shows,

@@ -12,8 +12,7 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
     let g = &d.refit[worst];
     // what no effect was found for is gone by the refit alone
     let found = d.findings.iter().any(|f| f.member);
-    let shrink = d.holdout.map(|[a, b]| 1.0 - b / a.max(1e-9));
-    let shrink = shrink.filter(|_| found);
+    let shrink = d.shrink().filter(|_| found);
     let share = |s: Option<f64>| s.map_or("–".to_string(), percent);
     let all = [
         (
