@@ -18,6 +18,7 @@ use super::column::Column;
 use super::data::Data;
 use super::evidence::Evidence;
 use super::thresholds::THRESHOLDS as T;
+use super::verdict::inflation;
 use std::borrow::Cow;
 
 /// What the records say of it.
@@ -26,6 +27,8 @@ pub struct Channel {
     pub window: f64,
     /// time by which dry friction reverses before the velocity does, s
     pub lead: f64,
+    /// its deviation where what the model leaves counts as noise, s; infinite where it was not looked for
+    pub deviation: f64,
     /// parameters of the refitted nominal model
     pub phi: Vec<f64>,
 }
@@ -44,13 +47,14 @@ impl Channel {
             true => 0.0,
             false => e.fit(&[&e.project(std::slice::from_ref(&curved))]).eta[0],
         };
-        let mut lead = data.lead;
+        let (mut lead, mut deviation) = (data.lead, f64::INFINITY);
         if leads {
             let step = T.reversals.step;
             let all = e.project(&[curved, data.slope(&model), data.earlier(&phi, step)]);
             let fit = e.fit(&[&all]);
             let more = (lead + step * fit.eta[2]).clamp(0.0, T.reversals.longest);
             let sure = step * fit.covariance[2][2].max(0.0).sqrt();
+            deviation = sure * inflation(&e.residual(&[&all], &fit), data.fitted);
             if more > T.reversals.shortest.max(T.reversals.sure * sure) {
                 lead = more;
             }
@@ -58,6 +62,7 @@ impl Channel {
         Channel {
             window: window(data.window + found),
             lead,
+            deviation,
             phi,
         }
     }
@@ -73,14 +78,20 @@ fn window(found: f64) -> f64 {
 }
 
 impl Data<'_> {
-    /// Takes dry friction to reverse as early as the records show; whether it does. No machine's friction does so by more
-    /// than some milliseconds, so less counts only where the log looks like a simulator's: coarse encoders, or no noise.
+    /// Takes dry friction to reverse as early as the records show; whether another lead may still be found. Less
+    /// than `reversals.early`, which a machine may have, counts only where the log looks like a simulator's: coarse
+    /// encoders, or no noise. Elsewhere it must also exceed eight deviations of what the model leaves, so that no large
+    /// effect passes for it.
     pub fn find_lead(&mut self) -> bool {
         if !self.may_lead() {
             return false;
         }
+        let mut least = T.reversals.early;
         for _ in 0..T.reversals.rounds {
-            let lead = Channel::of(self, true).lead;
+            let Channel {
+                lead, deviation, ..
+            } = Channel::of(self, true);
+            least = T.reversals.early.max(T.reversals.sure * deviation);
             let done = (lead - self.lead).abs() < T.reversals.settled;
             self.reverse_early(lead);
             if done {
@@ -88,7 +99,8 @@ impl Data<'_> {
             }
         }
         let plain = (0..self.joints()).any(|j| self.filtered(j) || self.noise[j].assumed);
-        if !plain && self.lead < T.reversals.early {
+        // the longest that is looked for is no time that was found
+        if !plain && !(least..T.reversals.longest).contains(&self.lead) {
             self.reverse_early(0.0);
         }
         plain || self.lead > 0.0

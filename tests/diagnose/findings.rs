@@ -20,6 +20,13 @@ use excite::trajectory::parts::Series;
 use rand::Rng;
 
 const RATE: f64 = 200.0;
+/// Period, whether it has odd harmonics only, and whether it is fitted, of the motions of a set of logs.
+const MOTIONS: [(f64, bool, bool); 4] = [
+    (4.0, true, true),
+    (9.0, true, true),
+    (5.0, false, true),
+    (4.5, false, false),
+];
 
 /// A robot of two joints with friction; the model and a machine that differs in the ordinary way.
 fn robots() -> (Plant, excite::Robot) {
@@ -119,13 +126,7 @@ fn logs_of(
     machines: [&excite::Robot; 4],
     extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64,
 ) -> Vec<Record> {
-    let records = [
-        (4.0, true, true),
-        (9.0, true, true),
-        (5.0, false, true),
-        (4.5, false, false),
-    ];
-    records
+    MOTIONS
         .iter()
         .enumerate()
         .map(|(k, (period, odd, fit))| {
@@ -448,12 +449,6 @@ fn a_load_out_of_reach_is_ruled_out_and_said() {
 /// Logs of a sound machine whose dry friction reverses `lead` seconds before the velocity does.
 fn reversing_early(lead: f64) -> Vec<Record> {
     let machine = robots().1;
-    let records = [
-        (4.0, true, true),
-        (9.0, true, true),
-        (5.0, false, true),
-        (4.5, false, false),
-    ];
     let of = |(k, (period, odd, fit)): (usize, &(f64, bool, bool))| {
         let f = motion(*period, *odd, k as u64);
         let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
@@ -463,7 +458,7 @@ fn reversing_early(lead: f64) -> Vec<Record> {
         };
         log(&machine, &f, *fit, 50 + k as u64, &mut early)
     };
-    records.iter().enumerate().map(of).collect()
+    MOTIONS.iter().enumerate().map(of).collect()
 }
 
 /// A simulator's friction opposes `q̇ + T q̈`. That is the simulator's, and no delay of the torque.
@@ -483,6 +478,28 @@ fn friction_that_reverses_early_is_a_simulators() {
     assert_eq!(
         (claims(&d), d.verdict),
         (vec![], Verdict::NoGap),
+        "{:?}",
+        d.findings
+    );
+}
+
+/// A large effect that the model lacks does not pass for reversals that come early.
+#[test]
+fn a_large_effect_is_no_early_reversal() {
+    let model = robots().0.robot().clone();
+    let plant = Plant::from(model.with_terms(&[JointTerm::Coulomb, JointTerm::Offset]));
+    let machine = robots().1;
+    let more = &mut |j: usize, _: f64, _: &[f64], v: &[f64], _: f64| match j {
+        1 => 8.0 * v[1],
+        _ => 0.0,
+    };
+    let logs = logs_of([&machine; 4], more);
+    assert_eq!(prepare(&plant, &logs).expect("records").lead, 0.0);
+    let settings = Settings::default().with(|set| set.next = false);
+    let d = of_logs(&plant, &logs, &settings, &|_| {}).expect("a diagnosis");
+    assert_eq!(
+        claims(&d)[0],
+        ("viscous_friction", vec![1]),
         "{:?}",
         d.findings
     );
