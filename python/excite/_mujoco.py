@@ -41,7 +41,7 @@ def _module(text: str) -> ModuleType:
 
 
 class Model:
-    """A robot file for MuJoCo, with the file of effects beside it where there is one."""
+    """A robot file for MuJoCo, with the file of effects beside it where there is one; of a parallel robot there is."""
 
     def __init__(
         self, xml: str, effects: Optional[str], joints: List[str], name: str, tree: Optional[List[str]] = None
@@ -51,7 +51,7 @@ class Model:
             self._model = mj.MjModel.from_xml_string(xml)
         except ValueError as e:
             raise unusable(f"MuJoCo does not load the {name} model: {e}") from None
-        self._effects = None if effects is None else _module(effects)
+        self._effects: Any = None if effects is None else _module(effects)
         self.name = name
         #: of a parallel robot, whose loops equality constraints close, or whose legs are tendons
         self._closed = tree is not None
@@ -75,6 +75,9 @@ class Model:
         self._own_step = float(self._model.opt.timestep)
         # what is not in the file costs no time in every step
         self._displaced = bool(getattr(self._effects, "DISPLACED", []))
+        # of a parallel robot there are functions with or without effects
+        acting = ("ADDED", "REMEMBERED") if self._closed else ()
+        self._acts = effects is not None and (not acting or any(getattr(self._effects, name) for name in acting))
         self._driven = any(not native for _, _, native in getattr(self._effects, "DRIVES", []))
         #: what goes on from one record to the next, and its state where each record begins
         self.lasting: List[str] = list(getattr(self._effects, "LASTING", []))
@@ -109,7 +112,7 @@ class Model:
         self._model.opt.timestep = self._own_step
         if self._effects is not None:
             if memory is not None:
-                memory.update({**self._effects.start(q[0]), **{k: memory[k] for k in self.lasting if k in memory}})
+                self._begin(memory, q[0])
             return np.asarray(self._effects.inverse(self._model, q, dq, ddq, dt, memory), float)
         mj, data = self._mj, self._mj.MjData(self._model)
         tau = np.zeros_like(q)
@@ -120,61 +123,20 @@ class Model:
         out: Array = tau if self._drives is None else tau / self._gains()
         return out
 
-    def closing(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """As :meth:`inverse` for a parallel robot, along a motion of all joints of its tree.
+    def closing(self, q: Array, dq: Array, ddq: Array, dt: float, memory: Optional[Dict[str, Any]] = None) -> Array:
+        """As :meth:`inverse` for a parallel robot, along a motion of all joints of its tree."""
+        model, count = self._model, len(q)
+        self._model.opt.timestep = self._own_step
+        states = [np.zeros((count, n)) for n in (model.nq, model.nv, model.nv)]
+        for state, at, of in zip(states, (self._states_at, self._states_dof, self._states_dof), (q, dq, ddq)):
+            state[:, at] = of[:, self._known]
+        if memory is not None:
+            self._begin(memory, q[0, self._of_drives])
+        return np.asarray(self._effects.inverse(model, *states, dt, memory), float)
 
-        With the Jacobian ``J`` of the gaps of the loops, ``S tau + J^T lambda`` is what inverse dynamics of the open tree
-        asks of its joints, where ``S`` has a column for each drive.
-        """
-        mj, model = self._mj, self._model
-        data, n, drives = mj.MjData(model), model.nv, len(self._legs) or len(self._dof)
-        usual = int(model.opt.disableflags)
-        # the loops are open for inverse dynamics; friction stays
-        model.opt.disableflags = usual | int(mj.mjtDisableBit.mjDSBL_EQUALITY)
-        try:
-            welded = model.eq_type == mj.mjtEq.mjEQ_WELD
-            rows = drives + int(np.sum(np.where(welded, 6, 3)))
-            both, tau = np.zeros((rows, n)), np.zeros((len(q), drives))
-            gains = np.ones(drives) if self._drives is None else self._gains()
-            if not self._legs:
-                both[np.arange(drives), self._dof] = gains
-            ends = [[np.zeros((3, n)) for _ in range(4)] for _ in welded]
-            for i in range(len(q)):
-                state = (x[i, self._known] for x in (q, dq, ddq))
-                data.qpos[self._states_at], data.qvel[self._states_dof], data.qacc[self._states_dof] = state
-                mj.mj_inverse(model, data)
-                if self._legs:
-                    both[:drives] = gains[:, None] * self._lengthening(data)
-                at = drives
-                for e, (pa, ra, pb, rb) in enumerate(ends):
-                    mj.mj_jacSite(model, data, pa, ra, model.eq_obj1id[e])
-                    mj.mj_jacSite(model, data, pb, rb, model.eq_obj2id[e])
-                    both[at : at + 3] = pa - pb
-                    at += 3
-                    if welded[e]:
-                        both[at : at + 3] = ra - rb
-                        at += 3
-                tau[i] = np.linalg.lstsq(both.T, data.qfrc_inverse, rcond=1e-10)[0][:drives]
-        finally:
-            model.opt.disableflags = usual
-        # what the drive does without a command
-        bias = np.zeros(drives) if self._drives is None else model.actuator_biasprm[self._drives, 0]
-        out: Array = tau - bias / gains
-        return out
-
-    def _lengthening(self, data: Any) -> Array:
-        """Jacobian of the lengths of the legs that are tendons."""
-        mj, model = self._mj, self._model
-        rows = np.zeros((len(self._legs), model.nv))
-        ends = [np.zeros((3, model.nv)) for _ in range(2)]
-        for k, leg in enumerate(self._legs):
-            at = int(model.tendon_adr[leg])
-            sites = [int(model.wrap_objid[at]), int(model.wrap_objid[at + 1])]
-            for jacobian, site in zip(ends, sites):
-                mj.mj_jacSite(model, data, jacobian, None, site)
-            way = data.site_xpos[sites[1]] - data.site_xpos[sites[0]]
-            rows[k] = way @ (ends[1] - ends[0]) / np.linalg.norm(way)
-        return rows
+    def _begin(self, memory: Dict[str, Any], q: Array) -> None:
+        """Starts a memory anew but for what lasts."""
+        memory.update({**self._effects.start(q), **{k: memory[k] for k in self.lasting if k in memory}})
 
     def _gains(self) -> Array:
         """Torque of every joint by the signal of its actuator."""
@@ -187,11 +149,12 @@ class Model:
         out = {}
         for k in sorted(range(len(records)), key=lambda k: int(records[k]["order"])):
             r = records[k]
+            self.begins[int(r["order"])] = {key: memory[key] for key in self.lasting if key in memory}
             if self._closed:
-                out[k] = self.closing(*(from_columns(r[f"tree_{n}"], len(self._tree)) for n in ("q", "dq", "ddq")))
+                x, v, a = (from_columns(r[f"tree_{n}"], len(self._tree)) for n in ("q", "dq", "ddq"))
+                out[k] = self.closing(x, v, a, r["dt"], memory)
                 continue
             q, dq, ddq = (from_columns(r[name], joints) for name in ("q", "dq", "ddq"))
-            self.begins[int(r["order"])] = {key: memory[key] for key in self.lasting if key in memory}
             out[k] = self.inverse(q, dq, ddq, r["dt"], memory)
         return [out[k] for k in range(len(records))]
 
@@ -200,7 +163,7 @@ class Model:
         effects = self._effects
         if effects is None or not self.lasting:
             return {}
-        memory = {**effects.start(q[0] if len(q) else np.zeros(len(self._at))), **self.begins.get(order, {})}
+        memory = {**effects.start(q[0] if len(q) else np.zeros(len(self._of_drives))), **self.begins.get(order, {})}
         for x, v in zip(q, dq):
             memory = effects.parts(x, v, np.zeros_like(x), dt, memory)[2]
         return {key: memory[key] for key in self.lasting}
@@ -211,11 +174,11 @@ class Model:
         dq0: Array,
         command: Command,
         dt: float,
-        before: Optional[Command] = None,
+        before: "Optional[Tuple[Command, Array, Array]]" = None,
         lasting: Optional[Dict[str, Any]] = None,
     ) -> Array:
-        """Positions under a command, one row for each of its samples; ``before`` is played first. ``lasting`` is the
-        state of what lasts. The state at the start is that of all joints of the tree."""
+        """Positions under a command, one row for each of its samples; the command ``before`` is played first, from a state
+        of its own. ``lasting`` is the state of what lasts. States are those of all joints of the tree."""
         mj, effects = self._mj, self._effects
         # constraints that close loops are stiff: not slower than the file asks
         longest = min(STEP, self._own_step) if self._closed else STEP
@@ -224,14 +187,13 @@ class Model:
         data = mj.MjData(self._model)
         previous = mj.get_mjcb_passive()
         try:
-            installed = None if effects is None else effects.install(self._model)
-            first = [q0, dq0] if before is None else [before.q[0], before.dq[0]]
-            self._set(data, *first)
+            installed = effects.install(self._model) if self._acts else None
+            self._set(data, *((q0, dq0) if before is None else before[1:]))
             if installed is not None and lasting:
                 time, memory = installed.memory[data._address]
                 installed.memory[data._address] = (time, {**memory, **lasting})
             if before is not None:
-                self._play(data, before, steps)
+                self._play(data, before[0], steps)
                 self._set(data, q0, dq0)
             return self._play(data, command, steps)
         finally:
@@ -257,7 +219,7 @@ class Model:
 
     def _play(self, data: Any, command: Command, steps: int) -> Array:
         mj = self._mj
-        late = np.zeros(len(self._at))
+        late = np.zeros(len(self._of_drives))
         for j, seconds in getattr(self._effects, "DELAYED", []):
             late[j] = seconds
         out = np.empty_like(command.q)

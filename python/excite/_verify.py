@@ -190,9 +190,11 @@ def _simulators(
         improved = found.files.get("robot.xml")
         if nominal is None or improved is None:
             raise unusable("the robot has no file for MuJoCo; see the warnings of the diagnosis")
+        # what closes loops is in that file for parallel robots, effects or not
+        functions = robot._plant.functions() if robot.closed else None
         models = [
-            Model(nominal, texts.get("effects.py"), robot.joints, "nominal", robot.tree),
-            Model(improved, found.files.get("effects.py"), robot.joints, "improved", robot.tree),
+            Model(nominal, texts.get("effects.py", functions), robot.joints, "nominal", robot.tree),
+            Model(improved, found.files.get("effects.py", functions), robot.joints, "improved", robot.tree),
         ]
         return ["nominal", "improved"], models, []
     given = list(simulator) if isinstance(simulator, (list, tuple)) else [simulator]
@@ -339,7 +341,7 @@ def _run(
         before, first = None, start
         if model.remembers and start > 0:
             first = max(start - int(math.ceil(BEFORE / dt)), 0)
-            before = command(first, start, "hold")
+            before = (command(first, start, "hold"), *(x[first] for x in a["states"]))
         lasting = model.lasts(int(r["order"]), a["q"][:first], a["dq"][:first], dt)
         at, rate = (x[start] for x in a["states"])
         ran = model.run(at, rate, command(start, stop, "gains"), dt, before, lasting)

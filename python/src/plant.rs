@@ -1,7 +1,7 @@
 //! Robots: `Plant`.
 
 use crate::call::{quick, simply};
-use crate::error::{argument, internal, notices};
+use crate::error::{argument, internal, notices, to_python};
 use excite::dynamics::Samples;
 use excite::plant::Plant as Core;
 use excite::regressor::Regressor;
@@ -239,6 +239,16 @@ impl Plant {
                 Err(e) => (name.to_string(), None, e.to_string()),
             })
             .collect())
+    }
+
+    /// `effects.py` without an effect: what it has beside them serves any closed chain.
+    fn functions(&self) -> PyResult<String> {
+        let model = excite::export::parts::Model {
+            plant: &self.core,
+            robot: self.core.robot(),
+            remarks: &[],
+        };
+        excite::export::parts::functions(&model).map_err(|e| to_python(&e))
     }
 }
 

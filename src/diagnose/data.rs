@@ -220,6 +220,19 @@ impl<'a> Data<'a> {
         self.told(self.silenced((0..self.joints()).map(of).collect()))
     }
 
+    /// The same with zeros where drives of a closed chain may stick, as the residuals of fits have them: these rows say
+    /// nothing about any model.
+    pub fn gap_that_counts(&self, model: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let mut gap = self.gap_to(model);
+        if self.sticks() {
+            for (row, weights) in gap.iter_mut().zip(&self.weights) {
+                let rows = row.iter_mut().zip(weights);
+                rows.filter(|(_, w)| **w == 0.0).for_each(|(v, _)| *v = 0.0);
+            }
+        }
+        gap
+    }
+
     /// A function of the position and velocity of one actuator, averaged over the triangle of plus
     /// and minus one sample over which controllers average torque.
     pub fn own(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {

@@ -22,12 +22,11 @@
 //! Effects act as the torque that their columns give along the recorded motion, not along the
 //! simulated one. Torque noise is not taken off.
 
-use super::catalogue::{Context, Effect};
+use super::catalogue::{Context, Effect, Place, Shape};
 use super::controller::{Feedback, Kind as Acts};
 use super::data::Data;
 use super::payload::Load;
 use super::thresholds::THRESHOLDS as T;
-use super::verdict::Member;
 use crate::error::{Error, Result};
 use crate::report::format::unit_of;
 use crate::robot::Robot;
@@ -77,17 +76,16 @@ pub struct Forward {
     pub failed: Vec<String>,
 }
 
-/// Torque of the effects along the recorded motion, by actuator over all records.
-pub fn effects_torque(
+/// Torque of effects with their coefficients along the recorded motion, by actuator over all records.
+pub fn effects_torque<'e>(
     cx: &Context,
-    effects: &[Box<dyn Effect>],
-    members: &[Member],
+    all: impl Iterator<Item = (&'e dyn Effect, Place, &'e Shape, &'e [f64])>,
 ) -> Vec<Vec<f64>> {
     let data = cx.data;
     let mut torque = vec![vec![0.0; data.rows()]; data.joints()];
-    for c in members.iter().map(|m| &m.candidate) {
-        let columns = effects[c.effect].columns(cx, &c.place, &c.shape, false);
-        for (column, eta) in columns.iter().zip(&c.eta) {
+    for (effect, place, shape, eta) in all {
+        let columns = effect.columns(cx, &place, shape, false);
+        for (column, eta) in columns.iter().zip(eta) {
             for (j, values) in &column.rows {
                 for (t, v) in torque[*j].iter_mut().zip(values) {
                     *t += eta * v;

@@ -11,10 +11,12 @@
 //! with the entropic distance `d` of [`consistent`], the barrier that keeps
 //! every body inside.
 
-use super::catalogue::{Context, Effect, Estimate};
+use super::catalogue::{self, Context, Effect, Estimate};
 use super::evidence::Evidence;
 use super::finding::Finding;
+use super::forward::effects_torque;
 use super::thresholds::THRESHOLDS as T;
+use super::{gap, result};
 use crate::error::{Warning, WarningKind};
 use crate::export::{self, Remark};
 use crate::identify::consistent::{self, Prior};
@@ -39,19 +41,86 @@ pub struct Improved {
     pub scene: Option<export::Edited>,
 }
 
-/// The robot with the parameters `phi`, and of the findings what was claimed.
+/// The robot with the parameters `phi` of the fit and what was claimed. The nominal one where, as it stands in the files,
+/// less of the records that were not fitted is left with that: `frozen` is the gap to it.
 pub fn improve(
     evidence: &Evidence,
     cx: &Context,
     effects: &[Box<dyn Effect>],
     phi: &[f64],
     findings: &[Finding],
+    frozen: &[Vec<f64>],
 ) -> (Improved, Vec<Warning>) {
+    let (data, plant) = (cx.data, cx.data.plant);
+    let count = plant.parameters().len();
+    let left = |e: &[Vec<f64>]| -> f64 {
+        let held = gap::energies(data, &result::scaled(data, e), |r| !r.fit);
+        held.iter().flatten().sum()
+    };
+    let found = written(evidence, cx, effects, &phi[..count], findings);
+    if !data.predicts() {
+        return (found.improved, found.warnings);
+    }
+    let claimed = findings.iter().filter_map(|f| {
+        let effect = named(effects, f).filter(|_| f.is_claim())?;
+        Some((effect, f.place, &f.shape, &f.eta[..]))
+    });
+    let mut values = data.without_allowance(phi);
+    values[..count].copy_from_slice(&found.values);
+    let mut torque = data.model_torque(&values);
+    for (row, more) in torque.iter_mut().zip(effects_torque(cx, claimed)) {
+        row.iter_mut().zip(more).for_each(|(t, v)| *t += v);
+    }
+    let [before, after] = [left(frozen), left(&data.gap_that_counts(&torque))];
+    if after <= before + data.joints() as f64 * T.improved.seen.powi(2) {
+        return (found.improved, found.warnings);
+    }
+    // a file that predicts worse than the model that is there helps nobody
+    let nominal = written(evidence, cx, effects, &evidence.phi[..count], &[]);
+    let mut warnings = nominal.warnings;
+    warnings.push(Warning::new(
+        WarningKind::WorseThanNominal,
+        plant.name(),
+        match before {
+            gap if gap > 0.0 => format!(
+                "with what was fitted {:.2} times the gap of the nominal model is left on holdout records; the \
+                 robot files hold the nominal model",
+                after / gap
+            ),
+            _ => "with what was fitted more is left on holdout records than with the nominal model, which leaves \
+                  nothing but noise there; the robot files hold the nominal model"
+                .to_string(),
+        },
+    ));
+    (nominal.improved, warnings)
+}
+
+/// The effect of a finding.
+fn named<'e>(effects: &'e [Box<dyn Effect>], f: &Finding) -> Option<&'e dyn Effect> {
+    let found = effects.iter().find(|e| e.card().name == f.effect);
+    found.map(|e| e.as_ref())
+}
+
+/// A model for the files.
+struct Written {
+    improved: Improved,
+    warnings: Vec<Warning>,
+    /// parameters that go with the torque of the effects: those fitted, with what bodies that can exist change of them
+    values: Vec<f64>,
+}
+
+fn written(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    phi: &[f64],
+    findings: &[Finding],
+) -> Written {
     let plant = cx.data.plant;
     let mut robot = plant.with_values(phi);
     let mut remarks = Vec::new();
     for f in findings.iter().filter(|f| f.is_claim()) {
-        let Some(effect) = effects.iter().find(|e| e.card().name == f.effect) else {
+        let Some(effect) = named(effects, f) else {
             continue;
         };
         let estimate = Estimate {
@@ -76,10 +145,14 @@ pub fn improve(
                 })
                 .collect(),
             held: effect.apply(cx, &estimate, &mut robot),
-            element: effect.element(cx, &estimate),
+            element: catalogue::element(cx, effect, &estimate),
         });
     }
+    let fitted = plant.values_in(&robot);
     let warnings = able(plant, evidence, &mut robot);
+    let moved = plant.values_in(&robot);
+    let moved = moved.iter().zip(&fitted).map(|(a, b)| a - b);
+    let values = phi.iter().zip(moved).map(|(x, m)| x + m).collect();
     let files = export::needed(&export::Model {
         plant,
         robot: &robot,
@@ -92,7 +165,11 @@ pub fn improve(
         files,
         scene: None,
     };
-    (improved, warnings)
+    Written {
+        improved,
+        warnings,
+        values,
+    }
 }
 
 /// Turns the bodies of a robot into such that can exist.

@@ -79,7 +79,7 @@ pub use traces::Trace;
 pub(crate) use verdict::Verdict;
 
 use self::thresholds::THRESHOLDS as T;
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result};
 use crate::log::{self, Experiment, Purpose};
 use crate::plant::Plant;
 use crate::signals::series::Series;
@@ -200,45 +200,19 @@ pub fn of_logs(
     let members = decision.projected();
     let fit = evidence.fit(&members);
     let phi_after = evidence.parameters(&members, &fit);
-    let frozen = data.gap_to(&data.model_torque(&evidence.phi));
+    let frozen = data.gap_that_counts(&data.model_torque(&evidence.phi));
     let [refit, after] = [&[][..], &members].map(|set| evidence.torque_left(set));
     let mut findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
     let fitted = |r: &Series| r.fit;
     let residual_gap = gap::joints(&data, &refit, fitted);
     progress("forward simulation");
-    let added = forward::effects_torque(&cx, &effects, &decision.members);
+    let all = decision.members.iter().map(|m| &m.candidate);
+    let all = all.map(|c| (effects[c.effect].as_ref(), c.place, &c.shape, &c.eta[..]));
+    let added = forward::effects_torque(&cx, all);
     let held = controller::identify(&data, &evidence.phi);
     let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
-    let unknowns = &phi_after[..plant.parameters().len()];
-    let left = |e: &[Vec<f64>]| -> f64 {
-        let held = gap::energies(&data, &result::scaled(&data, e), |r| !r.fit);
-        held.iter().flatten().sum()
-    };
-    let worse = data.predicts() && left(&after) > left(&frozen);
-    let (improved, mut warnings) = match worse {
-        false => improve::improve(&evidence, &cx, &effects, unknowns, &findings),
-        // a file that predicts worse than the model that is there helps nobody
-        true => {
-            let nominal = &evidence.phi[..plant.parameters().len()];
-            improve::improve(&evidence, &cx, &effects, nominal, &[])
-        }
-    };
-    if worse {
-        warnings.push(Warning::new(
-            WarningKind::WorseThanNominal,
-            plant.name(),
-            match left(&frozen) {
-                gap if gap > 0.0 => format!(
-                    "with what was fitted {:.2} times the gap of the nominal model is left on holdout records; the \
-                     robot files hold the nominal model",
-                    left(&after) / gap
-                ),
-                _ => "with what was fitted more is left on holdout records than with the nominal model, which leaves \
-                      nothing but noise there; the robot files hold the nominal model"
-                    .to_string(),
-            },
-        ));
-    }
+    let (improved, mut warnings) =
+        improve::improve(&evidence, &cx, &effects, &phi_after, &findings, &frozen);
     warnings.extend(payload::warnings(logs));
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
     let at_rest = at_rest::find(&data, &units);
@@ -301,7 +275,7 @@ pub fn of_logs(
         noise_source: result::noise_source(&data).into(),
         untestable: result::untestable(&data, &list, &effects),
         ruled_out: result::ruled_out(&data, &list, &effects),
-        phi: unknowns.to_vec(),
+        phi: phi_after[..plant.parameters().len()].to_vec(),
         improved,
         next: next.flatten(),
         forward,

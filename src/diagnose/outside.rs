@@ -27,7 +27,7 @@ pub fn energies(data: &Data, model: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// The gap less what is allowed for about reversals: coefficients `c` of the columns `A` of an actuator that minimise
 /// `|e − A c|²/σ² + Σ c²/s²` over the fitted records, with the noise `σ` and the spreads `s` that are expected.
 fn allowed(data: &Data, model: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut gap = data.gap_to(model);
+    let mut gap = data.gap_that_counts(model);
     let of: Vec<_> = (0..data.joints()).map(|j| data.at_reversals(j)).collect();
     // columns as the gap has them: filtered like the torque, and weighted
     let shown: [Vec<Vec<f64>>; 4] = std::array::from_fn(|c| {
@@ -37,7 +37,7 @@ fn allowed(data: &Data, model: &[Vec<f64>]) -> Vec<Vec<f64>> {
                 None => tau.clone(),
             })
             .collect();
-        let mut change = data.gap_to(&moved);
+        let mut change = data.gap_that_counts(&moved);
         for (change, gap) in change.iter_mut().zip(&gap) {
             change.iter_mut().zip(gap).for_each(|(v, e)| *v = e - *v);
         }

@@ -12,8 +12,9 @@ use super::window::{fine, sign};
 use crate::plant;
 use crate::robot::JointTerm;
 
-/// Name of the nuisance columns of reversals.
+/// Names of the nuisance columns: of reversals, and of the velocity within a step.
 const REVERSAL: &str = "reversal";
+const STEP: &str = "step";
 
 impl Data<'_> {
     /// What a log of any robot may have without being at odds with its model: reversals of friction
@@ -55,8 +56,16 @@ impl Data<'_> {
                     let step = T.window.within * r.dt * a.terms[1];
                     r.acceleration(j).iter().map(|v| step * v).collect()
                 });
-                ("step", Column::on(j, change), 1.0)
+                (STEP, Column::on(j, change), 1.0)
             })
+            .collect()
+    }
+
+    /// Parameters without what a log is allowed for, as files have them.
+    pub(super) fn without_allowance(&self, phi: &[f64]) -> Vec<f64> {
+        let allowed = |name: &str| [REVERSAL, STEP].contains(&name);
+        let all = phi.iter().zip(&self.parameters);
+        all.map(|(x, p)| if allowed(&p.name) { 0.0 } else { *x })
             .collect()
     }
 

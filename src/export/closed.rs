@@ -10,9 +10,10 @@
 
 mod legs;
 
+use super::element::{Element, Form, Kind};
 use super::mujoco::body::{kind, open, placement};
 use super::mujoco::joint::OnJoint;
-use super::mujoco::{followers, stiff};
+use super::mujoco::{SOME_FRICTION, followers, stiff};
 use super::{Format, Model, Part, breakaway, escape, remark, xml_comment};
 use crate::collision::scene::poses;
 use crate::error::{Error, Result};
@@ -54,6 +55,13 @@ impl Format for Closed {
         true
     }
 
+    fn element(&self, element: &Element) -> Form {
+        match element {
+            Element::Gain { .. } | Element::Load { .. } => Form::Native,
+            _ => Form::None,
+        }
+    }
+
     fn write(&self, model: &Model) -> Result<String> {
         let Some(mechanism) = closed(model.plant) else {
             return Err(Error::Infeasible(
@@ -68,12 +76,38 @@ impl Format for Closed {
             None => "Loops are closed by equality constraints between sites; they hold in the keyframe `home`.".into(),
             Some(_) => "Legs without mass are tendons: forces along the line between their joints.".into(),
         });
+        // what stands on a drive beside the values of the model
+        let (mut robot, mut gains) = (model.robot.clone(), vec![1.0; mechanism.actuated.len()]);
+        for element in model.remarks.iter().filter_map(|r| r.element.as_ref()) {
+            match element {
+                Element::Gain { joint, error } => gains[*joint] /= 1.0 + error,
+                Element::Function(f) if matches!(f.kind, Kind::Torque | Kind::Memory) => {
+                    let terms = &mut robot.joints[mechanism.actuated[f.joint]].terms;
+                    let dry = &mut terms[JointTerm::Coulomb as usize];
+                    *dry = dry.max(SOME_FRICTION);
+                }
+                _ => {}
+            }
+        }
         Ok(format!(
             "{}{}",
             xml_comment(&lines),
-            text(mechanism, model.robot, &joins, legs.as_ref())
+            text(mechanism, &robot, &joins, legs.as_ref(), &gains)
         ))
     }
+}
+
+/// Length less the position of its drive of each leg that is a tendon, m; 0 for drives on joints.
+///
+/// # Errors
+/// Rods that end on nothing.
+pub(super) fn zeros(model: &Model) -> Result<Vec<f64>> {
+    let Some(mechanism) = closed(model.plant) else {
+        return Ok(Vec::new());
+    };
+    let legs = Legs::of(mechanism, model.robot, &joins(mechanism)?);
+    let zero = |a: &usize| legs.as_ref().map_or(0.0, |l| l.zero(*a));
+    Ok(mechanism.actuated.iter().map(zero).collect())
 }
 
 /// The mechanism with the pose of its platform as coordinates.
@@ -193,7 +227,13 @@ fn ends(mechanism: &Mechanism) -> Result<Vec<Join>> {
     .collect()
 }
 
-fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join], legs: Option<&Legs>) -> String {
+fn text(
+    mechanism: &Mechanism,
+    robot: &Robot,
+    joins: &[Join],
+    legs: Option<&Legs>,
+    gains: &[f64],
+) -> String {
     let mut out = String::new();
     let (g, dry) = (robot.gravity, stiff());
     let _ = writeln!(
@@ -233,7 +273,7 @@ fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join], legs: Option<&Legs
     }
     followers(robot, &mut out);
     out += "  <actuator>\n";
-    for &a in &mechanism.actuated {
+    for (&a, gain) in mechanism.actuated.iter().zip(gains) {
         let joint = &robot.joints[a];
         let name = escape(&joint.name);
         let at = legs.map_or(format!("joint=\"{name}\""), |l| l.drive(robot, a));
@@ -242,7 +282,11 @@ fn text(mechanism: &Mechanism, robot: &Robot, joins: &[Join], legs: Option<&Legs
             true => format!(" forcerange=\"-{effort} {effort}\""),
             false => String::new(),
         };
-        let _ = writeln!(out, "    <general name=\"{name}\" {at}{range}/>");
+        let gain = match *gain == 1.0 {
+            true => String::new(),
+            false => format!(" gainprm=\"{gain}\""),
+        };
+        let _ = writeln!(out, "    <general name=\"{name}\" {at}{gain}{range}/>");
     }
     out += "  </actuator>\n";
     if let Ok(q) = mechanism.inverse(&mechanism.home) {

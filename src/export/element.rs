@@ -10,7 +10,7 @@ use crate::robot::Inertia;
 pub const FUNCTIONS: &str = "effects.py";
 
 /// A part of a machine. Joints are coordinates of [`Robot::joints`](crate::Robot::joints); torques are those that
-/// the drive has to make.
+/// the drive has to make. Of a closed chain they are its drives.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Element {
@@ -202,6 +202,30 @@ impl Element {
             start: None,
             lasts: false,
         })
+    }
+
+    /// The same as a function, where it is one of the state of a joint: for files that have no element for it.
+    /// `width` as in [`Function`].
+    pub(crate) fn as_function(self, width: f64) -> Element {
+        match self {
+            Element::Drag {
+                joint,
+                power,
+                factor,
+            } => {
+                let torque = format!("{} * xp.abs(dq) ** {} * dq", py(factor), power - 1);
+                Element::smooth(joint, width, torque)
+            }
+            Element::Spring {
+                joint,
+                coefficients,
+            } => {
+                let [a, b, c, d] = coefficients.map(py);
+                let torque = format!("{a} + q * ({b} + q * ({c} + q * {d}))");
+                Element::smooth(joint, width, torque)
+            }
+            other => other,
+        }
     }
 
     /// What MuJoCo's files say of it.

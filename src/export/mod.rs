@@ -5,7 +5,7 @@
 //! | `robot.urdf` | [`urdf`] | tree, inertia, limits, viscous and Coulomb friction | all |
 //! | `robot.xml` | `mujoco` | the same for MuJoCo, rotor inertia, gravity, springs, drives | serial |
 //! | `robot.xml` | `closed` | the same with loops as equality constraints | parallel |
-//! | `effects.py` | `effects` | what MuJoCo has no element for, as functions of state and time step | serial |
+//! | `effects.py` | `effects` | what MuJoCo has no element for, as functions of state and time step | all |
 //! | `robot.toml` | `robot_toml`, [`mechanism`] | what the other commands read, geometry and loops included | all |
 //!
 //! On demand ([`further`]): `robot.sdf` (Gazebo), `robot.usda` (USD physics), `actuators.py` (Isaac Lab).

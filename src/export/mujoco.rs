@@ -30,7 +30,7 @@ pub(super) const STIFF: [(&str, &str); 2] = [
     ("solimpfriction", "0.99 0.99 0.001"),
 ];
 /// Least dry friction of a joint whose level a function sets, N m or N: the constraint is there from above zero on.
-const SOME_FRICTION: f64 = 1e-9;
+pub(super) const SOME_FRICTION: f64 = 1e-9;
 
 impl Format for Mujoco {
     fn name(&self) -> &'static str {

@@ -35,19 +35,24 @@ impl Remark {
     }
 }
 
+/// The format of `robot.xml` for robots of this kind.
+pub(super) fn of(plant: &Plant) -> &'static dyn Format {
+    match plant.closed() {
+        true => &Closed,
+        false => &Mujoco,
+    }
+}
+
 /// How the files for MuJoCo hold something.
 pub fn in_mujoco(plant: &Plant, held: Option<Part>, element: Option<&Element>) -> Form {
-    if !Mujoco.holds(plant) {
-        // the file of a closed chain has its values and no element beside them
-        return match held {
-            Some(_) if Closed.holds(plant) => Form::Native,
-            _ => Form::None,
-        };
+    let native = of(plant);
+    if !native.holds(plant) {
+        return Form::None;
     }
-    if held.is_some_and(|part| Mujoco.has(part)) {
+    if held.is_some_and(|part| native.has(part)) {
         return Form::Native;
     }
-    element.map_or(Form::None, |e| match Mujoco.element(e) {
+    element.map_or(Form::None, |e| match native.element(e) {
         Form::None if e.is_function() => Form::Callback,
         form => form,
     })

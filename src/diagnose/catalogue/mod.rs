@@ -230,7 +230,19 @@ pub fn all() -> Vec<Box<dyn Effect>> {
 pub(crate) fn in_mujoco(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Form {
     let plant = cx.data.plant;
     let held = effect.apply(cx, e, &mut plant.robot().clone());
-    simulator::in_mujoco(plant, held, effect.element(cx, e).as_ref())
+    simulator::in_mujoco(plant, held, element(cx, effect, e).as_ref())
+}
+
+/// What an effect is in a simulator: on a closed chain, whose drives may be tendons, functions only.
+pub(crate) fn element(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Option<Element> {
+    let found = effect.element(cx, e)?;
+    match cx.data.plant.closed() {
+        true => {
+            let width = T.reversals.sharp * cx.data.speed[e.place.first()];
+            Some(found.as_function(width))
+        }
+        false => Some(found),
+    }
 }
 
 /// Adds an effect of one coefficient to a term of its joint.

@@ -60,6 +60,12 @@ impl Legs {
         up.last().is_some_and(|b| self.begins(b).is_some())
     }
 
+    /// Length of the leg of a coordinate less that coordinate, m.
+    pub(super) fn zero(&self, coordinate: usize) -> f64 {
+        let leg = self.0.iter().find(|l| l.coordinate == coordinate);
+        leg.map_or(0.0, |l| l.zero)
+    }
+
     /// The tendons and their drives.
     pub(super) fn write(&self, robot: &Robot, out: &mut String) {
         out.push_str("  <tendon>\n");

@@ -1,13 +1,16 @@
 //! `effects.py`: what a model has and MuJoCo has no element for, as functions of state and time step.
 //!
+//! Of a closed chain its joints are the drives, and inverse dynamics is that of the tree with the forces in the loops.
+//!
 //! The file needs NumPy, and MuJoCo where it is installed in a model; nothing of excite. Its functions are pure,
 //! and take the array module (NumPy, JAX, Torch) as an argument.
 
 use super::element::{Element, FUNCTIONS, Function, Kind, py};
 use super::mujoco::{base_joints, twist_joint};
-use super::{Form, Format, Model, Part, Remark};
+use super::{Form, Format, Model, Part, Remark, closed, simulator};
 use crate::error::Result;
-use crate::robot::{Motion, Robot};
+use crate::plant::Plant;
+use crate::robot::{Joint, Motion, Robot};
 use serde_json::json;
 use std::fmt::Write;
 
@@ -16,6 +19,10 @@ const SHARP: f64 = 1e-3;
 
 /// What is the same in every file.
 const RUNTIME: &str = include_str!("runtime.py");
+/// What is the same in the files of serial and tree robots.
+const OPEN: &str = include_str!("open.py");
+/// What is the same in the files of closed chains.
+const CLOSED: &str = include_str!("closed.py");
 
 /// The file of functions beside MuJoCo's XML.
 pub struct Effects;
@@ -27,6 +34,10 @@ impl Format for Effects {
 
     fn file(&self) -> &'static str {
         FUNCTIONS
+    }
+
+    fn holds(&self, plant: &Plant) -> bool {
+        simulator::of(plant).holds(plant)
     }
 
     fn has(&self, _part: Part) -> bool {
@@ -46,8 +57,16 @@ impl Format for Effects {
     }
 
     fn write(&self, model: &Model) -> Result<String> {
-        Ok(text(model))
+        text(model)
     }
+}
+
+/// The file of a model whether it has effects or not: what `effects.py` has beside them serves any model.
+///
+/// # Errors
+/// A closed chain whose loops cannot be written.
+pub fn functions(model: &Model) -> Result<String> {
+    text(model)
 }
 
 /// Tables that the functions stand in, line by line.
@@ -61,21 +80,36 @@ struct Tables {
     delayed: Vec<String>,
     free: Vec<String>,
     widths: Vec<Option<f64>>,
+    loaded: bool,
 }
 
-fn text(model: &Model) -> String {
-    let robot = model.robot;
+fn text(model: &Model) -> Result<String> {
+    let (robot, chain) = (model.robot, model.plant.closed());
+    let drives: Vec<&Joint> = model
+        .plant
+        .actuated()
+        .iter()
+        .map(|&a| &robot.joints[a])
+        .collect();
+    let along = match chain {
+        true => {
+            "effects.inverse(model, qpos, qvel, qacc, dt)  # torque along a motion (samples, drives)"
+        }
+        false => {
+            "effects.inverse(model, q, dq, ddq, dt)  # torque along a motion (samples, joints)"
+        }
+    };
     let mut out = format!(
         "\"\"\"Effects of {} that MuJoCo has no element for, found by `excite diagnose`; belongs to robot.xml.\n\n    \
          import mujoco, effects\n    model = mujoco.MjModel.from_xml_path(\"robot.xml\")\n    \
-         effects.install(model)                      # mj_step and mj_inverse have them now\n    \
-         tau = effects.inverse(model, q, dq, ddq, dt)  # torque along a motion (samples, joints)\n\n\
+         effects.install(model)                      # mj_step {} them now\n    tau = {along}\n\n\
          SI units. The functions are pure: arrays in, arrays out, of NumPy, JAX or Torch (`xp`).\n\n",
-        one_line(&robot.name)
+        one_line(&robot.name),
+        if chain { "has" } else { "and mj_inverse have" }
     );
     let mut functions = String::new();
     let mut tables = Tables {
-        widths: vec![None; robot.dof()],
+        widths: vec![None; drives.len()],
         ..Tables::default()
     };
     for (k, remark) in model.remarks.iter().enumerate() {
@@ -94,28 +128,54 @@ fn text(model: &Model) -> String {
             remark.values.join("\n    ")
         );
         let name = format!("{}_{}", remark.effect, k + 1);
-        add(&name, remark, element, robot, &mut functions, &mut tables);
+        add(
+            &name,
+            remark,
+            element,
+            (robot, &drives),
+            &mut functions,
+            &mut tables,
+        );
     }
     out += "\"\"\"\n\nimport numpy as np\n\n";
-    let names: Vec<String> = robot
-        .joints
-        .iter()
-        .map(|j| json!(j.name).to_string())
-        .collect();
-    let width = |(w, j): (&Option<f64>, &crate::robot::Joint)| {
+    let names: Vec<String> = drives.iter().map(|j| json!(j.name).to_string()).collect();
+    let width = |(w, j): (&Option<f64>, &&Joint)| {
         let top = j.limits.velocity;
         py(w.unwrap_or(if top.is_finite() { SHARP * top } else { SHARP }))
     };
-    let widths: Vec<String> = tables.widths.iter().zip(&robot.joints).map(width).collect();
-    let _ = writeln!(out, "# the joints, in the order of all arrays");
+    let widths: Vec<String> = tables.widths.iter().zip(&drives).map(width).collect();
+    let _ = writeln!(
+        out,
+        "# the {}, in the order of all arrays",
+        if chain { "drives" } else { "joints" }
+    );
     let _ = writeln!(out, "JOINTS = [{}]", names.join(", "));
     let _ = writeln!(
         out,
         "# speed over which the sign of a velocity turns in `torque`, rad/s or m/s"
     );
     let _ = writeln!(out, "WIDTH = [{}]", widths.join(", "));
+    if chain {
+        let _ = writeln!(
+            out,
+            "# length of each leg that is a tendon less the position of its drive, m"
+        );
+        let zeros: Vec<String> = closed::zeros(model)?.into_iter().map(py).collect();
+        let _ = writeln!(out, "ZERO = np.array([{}])", zeros.join(", "));
+        let _ = writeln!(
+            out,
+            "# whether a function asks for the torque of the rigid bodies"
+        );
+        let _ = writeln!(
+            out,
+            "LOADED = {}",
+            if tables.loaded { "True" } else { "False" }
+        );
+    }
     out += &functions;
     out += "\n\n";
+    // neither is known of closed chains
+    let open = |name: &str| !matches!(name, "DISPLACED" | "FREE");
     for (what, name, rows) in [
         ("joint, function of the state", "ADDED", &tables.added),
         (
@@ -148,10 +208,13 @@ fn text(model: &Model) -> String {
             "FREE",
             &tables.free,
         ),
-    ] {
+    ]
+    .into_iter()
+    .filter(|(_, name, _)| !chain || open(name))
+    {
         let _ = writeln!(out, "# {what}\n{name} = [{}]", rows.join(", "));
     }
-    out + RUNTIME
+    Ok(out + RUNTIME + if chain { CLOSED } else { OPEN })
 }
 
 /// Text that stands in a documentation string on one line.
@@ -165,13 +228,13 @@ fn add(
     name: &str,
     remark: &Remark,
     element: &Element,
-    robot: &Robot,
+    (robot, drives): (&Robot, &[&Joint]),
     functions: &mut String,
     tables: &mut Tables,
 ) {
     let head = |arguments: &str| {
         let turning = match element {
-            Element::Function(f) => robot.joints[f.joint].motion == Motion::Revolute,
+            Element::Function(f) => drives[f.joint].motion == Motion::Revolute,
             _ => true,
         };
         let [force, way] = if turning { ["N m", "rad"] } else { ["N", "m"] };
@@ -201,6 +264,8 @@ fn add(
             };
             *functions += &head(arguments);
             *functions += &body(lines);
+            let asks = matches!(kind, Kind::Torque | Kind::Memory);
+            tables.loaded |= asks && lines.iter().any(|l| l.contains("load"));
             if *lasts {
                 tables.lasting.push(format!("\"{name}\""));
             }
@@ -213,7 +278,7 @@ fn add(
                 Kind::Displacement => tables.displaced.push(format!("({joint}, {name})")),
                 Kind::Drive => tables.drives.push(format!("({joint}, {name}, False)")),
             }
-            if matches!(kind, Kind::Torque | Kind::Memory) {
+            if asks {
                 let w = tables.widths[*joint].unwrap_or(f64::INFINITY);
                 tables.widths[*joint] = Some(w.min(*width));
             }
