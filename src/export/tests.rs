@@ -117,3 +117,53 @@ fn what_stands_in_comments_does_not_break_the_file() {
         }
     }
 }
+
+#[test]
+fn effects_of_a_closed_chain_stand_on_its_drives() {
+    let plant = Plant::load("hexapod").unwrap();
+    let found = |effect, element| Remark {
+        effect,
+        place: "leg2".into(),
+        equation: "f",
+        values: Vec::new(),
+        held: None,
+        element: Some(element),
+    };
+    let drag = Element::Drag {
+        joint: 1,
+        power: 2,
+        factor: 300.0,
+    };
+    let gain = Element::Gain {
+        joint: 1,
+        error: 0.25,
+    };
+    let remarks = [
+        found("nonlinear_viscous_friction", drag.as_function(1e-3)),
+        found("torque_constant", gain),
+    ];
+    let model = Model {
+        plant: &plant,
+        robot: plant.robot(),
+        remarks: &remarks,
+    };
+    let files: Vec<_> = write(&model).into_iter().collect();
+    let text = |name: &str| {
+        let file = files.iter().find(|(n, _)| *n == name);
+        file.unwrap().1.as_ref().unwrap().clone()
+    };
+    let drive = text("robot.xml")
+        .lines()
+        .find(|l| l.contains("<general name=\"leg2\""))
+        .unwrap()
+        .to_string();
+    assert!(drive.contains("gainprm=\"0.8\""), "{drive}");
+    let effects = text("effects.py");
+    let legs: Vec<String> = (1..=6).map(|k| format!("\"leg{k}\"")).collect();
+    assert!(effects.contains(&format!("JOINTS = [{}]", legs.join(", "))));
+    assert!(effects.contains("return 0.0, 300.0 * xp.abs(dq) ** 1 * dq"));
+    assert!(effects.contains("ADDED = [(1, nonlinear_viscous_friction_1)]"));
+    assert!(effects.contains("DRIVES = [(1, torque_constant_2, True)]"));
+    assert!(effects.contains("def inverse(model, qpos, qvel, qacc, dt"));
+    assert!(!effects.contains("DISPLACED") && !effects.contains("FREE"));
+}
