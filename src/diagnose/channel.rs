@@ -13,6 +13,9 @@
 //! ```text
 //! τ − W φ = w c/2 + d s + κ (S(T + h) − S(T))        T ← T + κ h
 //! ```
+//!
+//! That friction is no sharp sign of it either: a constraint of softness `(1 − d)/d` gives
+//! `F_c clamp((q̇ + T q̈)/w)` with `w = T F_c (M⁻¹)_jj (1 − d)/d`, which is some hundredths of the speed of a light wrist.
 
 use super::column::Column;
 use super::data::Data;

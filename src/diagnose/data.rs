@@ -6,7 +6,7 @@
 use super::column::{Column, Columns};
 use super::noise::{Noise, ORDER};
 use super::prior::{self, Closeness, factors};
-use super::rigid::{inertia, rigid};
+use super::rigid::{moved, rigid};
 use super::window::{averaged, fine};
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -43,6 +43,8 @@ pub struct Data<'a> {
     pub weights: Vec<Vec<f64>>,
     /// inertia that an actuator accelerates, about the middle of the motion, kg m² or kg
     pub inertia: Vec<f64>,
+    /// deceleration that its dry friction alone gives an actuator, rad/s² or m/s²; of open chains
+    pub stops: Vec<f64>,
     /// variance of the window over which the torque channel averages, beyond plus and minus one
     /// sample, in samples squared; negative where it takes the torque at an instant
     pub window: f64,
@@ -153,6 +155,7 @@ impl<'a> Data<'a> {
                 })
             })
             .collect();
+        let moved = moved(plant, &records[0])?;
         let mut data = Data {
             plant,
             start,
@@ -165,7 +168,8 @@ impl<'a> Data<'a> {
             tau,
             noise: Vec::new(),
             weights: vec![vec![1.0; rows]; n],
-            inertia: inertia(plant, &records[0])?,
+            inertia: moved.inertia,
+            stops: moved.stops,
             free_load: vec![None; records.len()],
             records,
             window: 0.0,

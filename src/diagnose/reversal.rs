@@ -117,10 +117,15 @@ impl Data<'_> {
         self.led(j, self.lead, f)
     }
 
-    /// Sign of the velocity that the dry friction of actuator `j` feels with a `lead`.
+    /// Sign of the velocity that the dry friction of actuator `j` feels with a `lead`. A simulator's constraint gives way
+    /// by a share of what friction alone decelerates, so over that times the lead its friction turns.
     pub(super) fn dry_sign(&self, j: usize, lead: f64) -> Vec<f64> {
         let sharp = T.reversals.sharp * self.speed[j];
-        self.led(j, lead, |_, v| sign(v, sharp))
+        let soft = lead * T.reversals.soft * self.stops[j];
+        self.led(j, lead, |_, v| match soft > sharp {
+            true => (v / soft).clamp(-1.0, 1.0),
+            false => sign(v, sharp),
+        })
     }
 
     /// As [`Data::dry`] with a velocity `q̇ + T q̈` of another `lead` `T`.

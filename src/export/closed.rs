@@ -97,17 +97,17 @@ impl Format for Closed {
     }
 }
 
-/// Length less the position of its drive of each leg that is a tendon, m; 0 for drives on joints.
+/// Length less the position of its drive of each leg that is a tendon, m; 0 for drives on joints. `None`: no closed chain.
 ///
 /// # Errors
 /// Rods that end on nothing.
-pub(super) fn zeros(model: &Model) -> Result<Vec<f64>> {
+pub(super) fn zeros(model: &Model) -> Result<Option<Vec<f64>>> {
     let Some(mechanism) = closed(model.plant) else {
-        return Ok(Vec::new());
+        return Ok(None);
     };
     let legs = Legs::of(mechanism, model.robot, &joins(mechanism)?);
     let zero = |a: &usize| legs.as_ref().map_or(0.0, |l| l.zero(*a));
-    Ok(mechanism.actuated.iter().map(zero).collect())
+    Ok(Some(mechanism.actuated.iter().map(zero).collect()))
 }
 
 /// The mechanism with the pose of its platform as coordinates.

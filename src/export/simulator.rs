@@ -35,20 +35,17 @@ impl Remark {
     }
 }
 
-/// The format of `robot.xml` for robots of this kind.
-pub(super) fn of(plant: &Plant) -> &'static dyn Format {
-    match plant.closed() {
-        true => &Closed,
-        false => &Mujoco,
-    }
+/// The format of `robot.xml` for robots of this kind, where there is one.
+pub(super) fn of(plant: &Plant) -> Option<&'static dyn Format> {
+    let both: [&dyn Format; 2] = [&Mujoco, &Closed];
+    both.into_iter().find(|f| f.holds(plant))
 }
 
 /// How the files for MuJoCo hold something.
 pub fn in_mujoco(plant: &Plant, held: Option<Part>, element: Option<&Element>) -> Form {
-    let native = of(plant);
-    if !native.holds(plant) {
+    let Some(native) = of(plant) else {
         return Form::None;
-    }
+    };
     if held.is_some_and(|part| native.has(part)) {
         return Form::Native;
     }

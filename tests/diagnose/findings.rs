@@ -483,6 +483,58 @@ fn friction_that_reverses_early_is_a_simulators() {
     );
 }
 
+/// A simulator's friction turns over a speed that goes with its lead and with what friction alone decelerates: 2 % of the
+/// speed of this light forearm. Taken as sharp it would be friction that rises towards standstill.
+#[test]
+fn soft_friction_of_a_light_forearm_is_a_simulators() {
+    let (plant, mut machine) = robots();
+    let mut model = plant.robot().clone();
+    for robot in [&mut model, &mut machine] {
+        let forearm = &mut robot.bodies[1].inertia;
+        forearm.0.iter_mut().for_each(|v| *v *= 0.05);
+        robot.joints[1].terms[0] = 0.01;
+    }
+    let (lead, bodies) = (0.0095, Plant::from(machine.clone()));
+    let phi = bodies.values();
+    let mut logs = Vec::new();
+    for (k, (period, odd, fit)) in MOTIONS.iter().enumerate() {
+        let f = motion(*period, *odd, k as u64);
+        let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let mut soft = |j: usize, t: f64, _: &[f64], now: &[f64], _: f64| {
+            f.evaluate(t, [&mut q, &mut v, &mut a]);
+            // columns of the mass matrix, by unit accelerations
+            let mut x = Samples::zeros(2, 3);
+            for i in 0..2 {
+                (0..3).for_each(|s| x.q[3 * i + s] = q[i]);
+                x.qdd[3 * i + i] = 1.0;
+            }
+            let tau = bodies.rigid_torque(&x, &phi).expect("a torque");
+            let mass = |i: usize, k: usize| {
+                let rotor = if i == k {
+                    machine.joints[i].terms[0]
+                } else {
+                    0.0
+                };
+                tau[3 * i + k] - tau[3 * i + 2] + rotor
+            };
+            let det = mass(0, 0) * mass(1, 1) - mass(0, 1) * mass(1, 0);
+            let friction = machine.joints[j].terms[2];
+            let turns = lead * friction * mass(1 - j, 1 - j) / det / 9.0;
+            let felt = (v[j] + lead * a[j]) / turns;
+            friction * (felt.clamp(-1.0, 1.0) - now[j].signum())
+        };
+        logs.push(log(&machine, &f, *fit, 70 + k as u64, &mut soft));
+    }
+    let settings = Settings::default().with(|set| set.next = false);
+    let d = of_logs(&Plant::from(model), &logs, &settings, &|_| {}).expect("a diagnosis");
+    assert_eq!(
+        (claims(&d), d.verdict),
+        (vec![], Verdict::NoGap),
+        "{:?}",
+        d.findings
+    );
+}
+
 /// A large effect that the model lacks does not pass for reversals that come early.
 #[test]
 fn a_large_effect_is_no_early_reversal() {

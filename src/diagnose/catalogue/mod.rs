@@ -236,7 +236,7 @@ pub(crate) fn in_mujoco(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Form
 /// What an effect is in a simulator: on a closed chain, whose drives may be tendons, functions only.
 pub(crate) fn element(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Option<Element> {
     let found = effect.element(cx, e)?;
-    match cx.data.plant.closed() {
+    match Robots::Closed.hold(cx.data.plant) {
         true => {
             let width = T.reversals.sharp * cx.data.speed[e.place.first()];
             Some(found.as_function(width))

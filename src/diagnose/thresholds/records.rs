@@ -162,6 +162,9 @@ pub struct Reversals {
     /// Least such time that counts in a log that does not look like a simulator's. Unit: s. Source: MuJoCo's default gives
     /// 9.5 ms; of the recordings of three machines one settles at 4.8 ms (the EMPS), the others at 0.
     pub early: f64,
+    /// Part of the deceleration by dry friction alone by which a simulator's friction gives way, `(1 − d)/d`. Unit: share.
+    /// Source: MuJoCo's default `solimp`, `d` = 0.9.
+    pub soft: f64,
     /// Change of such a time below which it is not looked for again. Unit: s. Source: by hand.
     pub settled: f64,
     /// Rounds in which it is looked for. Unit: count. Source: by hand.
@@ -186,6 +189,7 @@ pub(super) const REVERSALS: Reversals = Reversals {
     shortest: 0.002,
     longest: 0.03,
     early: 0.006,
+    soft: 1.0 / 9.0,
     settled: 5e-4,
     rounds: 5,
     sure: 8.0,

@@ -37,7 +37,7 @@ impl Format for Effects {
     }
 
     fn holds(&self, plant: &Plant) -> bool {
-        simulator::of(plant).holds(plant)
+        simulator::of(plant).is_some()
     }
 
     fn has(&self, _part: Part) -> bool {
@@ -84,7 +84,8 @@ struct Tables {
 }
 
 fn text(model: &Model) -> Result<String> {
-    let (robot, chain) = (model.robot, model.plant.closed());
+    let (robot, zeros) = (model.robot, closed::zeros(model)?);
+    let chain = zeros.is_some();
     let drives: Vec<&Joint> = model
         .plant
         .actuated()
@@ -155,12 +156,12 @@ fn text(model: &Model) -> Result<String> {
         "# speed over which the sign of a velocity turns in `torque`, rad/s or m/s"
     );
     let _ = writeln!(out, "WIDTH = [{}]", widths.join(", "));
-    if chain {
+    if let Some(zeros) = zeros {
         let _ = writeln!(
             out,
             "# length of each leg that is a tendon less the position of its drive, m"
         );
-        let zeros: Vec<String> = closed::zeros(model)?.into_iter().map(py).collect();
+        let zeros: Vec<String> = zeros.into_iter().map(py).collect();
         let _ = writeln!(out, "ZERO = np.array([{}])", zeros.join(", "));
         let _ = writeln!(
             out,
