@@ -206,7 +206,7 @@ impl Element {
 
     /// The same as a function, where it is one of the state of a joint: for files that have no element for it.
     /// `width` as in [`Function`].
-    pub(crate) fn as_function(self, width: f64) -> Element {
+    pub(crate) fn into_function(self, width: f64) -> Element {
         match self {
             Element::Drag {
                 joint,

@@ -139,7 +139,7 @@ fn effects_of_a_closed_chain_stand_on_its_drives() {
         error: 0.25,
     };
     let remarks = [
-        found("nonlinear_viscous_friction", drag.as_function(1e-3)),
+        found("nonlinear_viscous_friction", drag.into_function(1e-3)),
         found("torque_constant", gain),
     ];
     let model = Model {

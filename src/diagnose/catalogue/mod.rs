@@ -239,7 +239,7 @@ pub(crate) fn element(cx: &Context, effect: &dyn Effect, e: &Estimate) -> Option
     match Robots::Closed.hold(cx.data.plant) {
         true => {
             let width = T.reversals.sharp * cx.data.speed[e.place.first()];
-            Some(found.as_function(width))
+            Some(found.into_function(width))
         }
         false => Some(found),
     }
