@@ -504,8 +504,8 @@ fn soft_friction_of_a_light_forearm_is_a_simulators() {
             f.evaluate(t, [&mut q, &mut v, &mut a]);
             // columns of the mass matrix, by unit accelerations
             let mut x = Samples::zeros(2, 3);
-            for i in 0..2 {
-                (0..3).for_each(|s| x.q[3 * i + s] = q[i]);
+            for (i, at) in q.iter().enumerate() {
+                (0..3).for_each(|s| x.q[3 * i + s] = *at);
                 x.qdd[3 * i + i] = 1.0;
             }
             let tau = bodies.rigid_torque(&x, &phi).expect("a torque");
