@@ -6,7 +6,6 @@ import importlib.util
 import math
 import tempfile
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
@@ -28,8 +27,10 @@ def mujoco() -> Any:
     return found
 
 
-def _module(text: str) -> ModuleType:
-    """A generated ``effects.py``."""
+def _module(text: Optional[str]) -> Any:
+    """A generated ``effects.py``, if there is one."""
+    if text is None:
+        return None
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "effects.py")
         path.write_text(text, encoding="utf-8")
@@ -51,11 +52,12 @@ class Model:
             self._model = mj.MjModel.from_xml_string(xml)
         except ValueError as e:
             raise unusable(f"MuJoCo does not load the {name} model: {e}") from None
-        self._effects: Any = None if effects is None else _module(effects)
+        self._effects = _module(effects)
         self.name = name
         #: of a parallel robot, whose loops equality constraints close, or whose legs are tendons
         self._closed = tree is not None
-        self._legs = [] if tree is None else self._tendons(joints)
+        chain = None if tree is None else self._effects.Chain(self._model)
+        self._legs = [] if chain is None or len(chain.dof) else list(chain.tendons)
         self._joints = [] if self._legs else [self._model.joint(j) for j in joints]
         self._at = np.array([int(j.qposadr[0]) for j in self._joints], int)
         self._dof = np.array([int(j.dofadr[0]) for j in self._joints], int)
@@ -76,8 +78,9 @@ class Model:
         # what is not in the file costs no time in every step
         self._displaced = bool(getattr(self._effects, "DISPLACED", []))
         # of a parallel robot there are functions with or without effects
-        acting = ("ADDED", "REMEMBERED") if self._closed else ()
-        self._acts = effects is not None and (not acting or any(getattr(self._effects, name) for name in acting))
+        self._acts = effects is not None and (
+            not self._closed or bool(self._effects.ADDED or self._effects.REMEMBERED)
+        )
         self._driven = any(not native for _, _, native in getattr(self._effects, "DRIVES", []))
         #: what goes on from one record to the next, and its state where each record begins
         self.lasting: List[str] = list(getattr(self._effects, "LASTING", []))
@@ -88,12 +91,6 @@ class Model:
     def _has(self, joint: str) -> bool:
         mj = self._mj
         return bool(mj.mj_name2id(self._model, mj.mjtObj.mjOBJ_JOINT, joint) >= 0)
-
-    def _tendons(self, joints: List[str]) -> List[int]:
-        """The tendons of these names, where all of them are tendons between two points."""
-        mj = self._mj
-        found = [int(mj.mj_name2id(self._model, mj.mjtObj.mjOBJ_TENDON, j)) for j in joints]
-        return found if min(found) >= 0 and not any(self._has(j) for j in joints) else []
 
     def _actuators(self) -> Optional[Array]:
         """Actuators in the order of the joints, where every joint has one."""

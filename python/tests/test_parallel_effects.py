@@ -13,15 +13,6 @@ import excite
 RATE, NOISE = 200.0, 0.5
 
 
-def smooth(values, seconds):
-    """A first-order lag."""
-    out, state = [], values[0]
-    for v in values:
-        state = state + (v - state) / (seconds * RATE)
-        out.append(state)
-    return np.array(out)
-
-
 def bristles(q, reach):
     """The slope of dry friction that turns over a way: one in sliding."""
     z, out = 0.0, []

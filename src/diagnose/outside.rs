@@ -3,7 +3,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::data::Data;
-use super::{gap, result};
+use super::gap;
 
 /// Energy of the gap above the noise by record and actuator, in units of the noise variance a sample. `model` is the
 /// torque by actuator on the rows of all records, N m or N. Reversals of dry friction that are sharper or rounder in the
@@ -13,7 +13,7 @@ use super::{gap, result};
 /// If there is not one number for each row.
 pub fn energies(data: &Data, model: &[Vec<f64>]) -> Vec<Vec<f64>> {
     assert!(model.len() == data.joints() && model.iter().all(|m| m.len() == data.rows()));
-    let scaled = result::scaled(data, &allowed(data, model));
+    let scaled = gap::scaled(data, &allowed(data, model));
     let of = |k: usize, j: usize| {
         let r = &data.records[k];
         let (a, b) = gap::excess(r, j, &scaled[j][data.span(k)]);

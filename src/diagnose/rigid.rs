@@ -39,7 +39,6 @@ pub fn moved(plant: &Plant, record: &Series) -> Result<Moved> {
     let phi = plant.values();
     let m = plant.coordinates();
     const POINTS: usize = 8;
-    let mut out = vec![0.0f64; n];
     let at = |i: usize| i * (record.count - 1) / (POINTS - 1);
     let mut x = Samples::zeros(m, POINTS);
     for k in 0..m {
@@ -56,11 +55,16 @@ pub fn moved(plant: &Plant, record: &Series) -> Result<Moved> {
         for j in 0..n {
             for i in 0..POINTS {
                 masses[i][(j, k)] = tau[j * POINTS + i] - rest[j * POINTS + i];
-                out[j] += masses[i][(j, k)].powi(2) / POINTS as f64;
             }
         }
     }
     let actuators = plant.actuators();
+    let squared = |j: usize, k: usize| -> f64 {
+        masses.iter().map(|mass| mass[(j, k)].powi(2)).sum::<f64>() / POINTS as f64
+    };
+    let inertia = (0..n)
+        .map(|j| (0..m).map(|k| squared(j, k)).sum::<f64>().sqrt() + actuators[j].terms[0])
+        .collect();
     let mut stops = vec![0.0; n];
     for mut mass in masses.into_iter().filter(DMatrix::is_square) {
         (0..n).for_each(|j| mass[(j, j)] += actuators[j].terms[0]);
@@ -70,10 +74,5 @@ pub fn moved(plant: &Plant, record: &Series) -> Result<Moved> {
         let each = stops.iter_mut().zip(&actuators).enumerate();
         each.for_each(|(j, (s, a))| *s += a.terms[2].abs() * inverse[(j, j)] / POINTS as f64);
     }
-    Ok(Moved {
-        inertia: (0..n)
-            .map(|j| out[j].sqrt() + actuators[j].terms[0])
-            .collect(),
-        stops,
-    })
+    Ok(Moved { inertia, stops })
 }

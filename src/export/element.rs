@@ -10,7 +10,7 @@ use crate::robot::Inertia;
 pub const FUNCTIONS: &str = "effects.py";
 
 /// A part of a machine. Joints are coordinates of [`Robot::joints`](crate::Robot::joints); torques are those that
-/// the drive has to make. Of a closed chain they are its drives.
+/// the drive has to make. Joints of a closed chain are its drives.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Element {

@@ -8,8 +8,9 @@ class Chain:
 
         kinds, closures = mujoco.mjtObj, mujoco.mjtEq
         self.tendons = [mujoco.mj_name2id(model, kinds.mjOBJ_TENDON, name) for name in JOINTS]
+        joints = [mujoco.mj_name2id(model, kinds.mjOBJ_JOINT, name) for name in JOINTS]
         # legs without mass are tendons; any other drive is one of a joint
-        driven = [] if min(self.tendons) >= 0 else [model.joint(name) for name in JOINTS]
+        driven = [] if min(self.tendons) >= 0 and max(joints) < 0 else [model.joint(name) for name in JOINTS]
         self.at = np.array([joint.qposadr[0] for joint in driven], int)
         self.dof = np.array([joint.dofadr[0] for joint in driven], int)
         sizes = {int(closures.mjEQ_CONNECT): 3, int(closures.mjEQ_WELD): 6, int(closures.mjEQ_JOINT): 1}
@@ -79,34 +80,22 @@ class Installed:
 
         chain, kinds = self.chain, mujoco.mjtConstraint
         q, dq = chain.state(data)
-        time, before = self.memory.get(data._address, (np.inf, None))
-        if data.time < time:
-            # a new run
-            time, before = data.time, start(q)
+        passed, before = recalled(self.memory, data, q)
         load = 0.0 * q
         if LOADED:
             # with the acceleration of the last step
             mujoco.mj_rne(model, data, 1, self.force)
             load = chain.balance(model, data, self.force)
-        dry, other, after = parts(q, dq, load, data.time - time, before)
+        dry, other, after = parts(q, dq, load, passed, before)
         self.memory[data._address] = (data.time, after)
         of, losses = (chain.dof, model.dof_frictionloss) if len(chain.dof) else (chain.tendons, model.tendon_frictionloss)
         kind = kinds.mjCNSTR_FRICTION_DOF if len(chain.dof) else kinds.mjCNSTR_FRICTION_TENDON
-        friction = data.efc_type[: data.nefc] == kind
         made = np.zeros(len(JOINTS))
         for j, on in enumerate(of):
             made[j], level = float(other[j]), float(dry[j])
-            if level == 0.0:
-                continue
-            # the solver's own friction holds what can be held, exactly at standstill
-            for row in np.flatnonzero(friction & (data.efc_id[: data.nefc] == on)):
-                level += losses[on]
-                data.efc_frictionloss[row] = max(level, 0.0)
-                if getattr(data, "nisland", 0) and row < len(data.map_efc2iefc):
-                    # the copy that the solver of mj_step reads
-                    data.iefc_frictionloss[data.map_efc2iefc[row]] = max(level, 0.0)
-                level = min(level, 0.0)
-            made[j] += level * float(np.tanh(dq[j] / WIDTH[j]))
+            if level != 0.0:
+                level = held(data, kind, on, losses[on], level)
+                made[j] += level * float(np.tanh(dq[j] / WIDTH[j]))
         data.qfrc_passive -= made @ chain.ways(model, data)
 
 
@@ -166,7 +155,4 @@ def inverse(model, qpos, qvel, qacc, dt, memory=None):
         model.dof_frictionloss[:], model.tendon_frictionloss[:] = losses
     if memory is not None and now is not None:
         memory.update(now)
-    tau, times = reported(tau), dt * np.arange(len(qpos))
-    for j, seconds in DELAYED:
-        tau[:, j] = np.interp(times - seconds, times, tau[:, j])
-    return tau
+    return logged(tau, dt)

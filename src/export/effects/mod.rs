@@ -1,6 +1,6 @@
 //! `effects.py`: what a model has and MuJoCo has no element for, as functions of state and time step.
 //!
-//! Of a closed chain its joints are the drives, and inverse dynamics is that of the tree with the forces in the loops.
+//! Joints of a closed chain are its drives, and inverse dynamics is that of the tree with the forces in the loops.
 //!
 //! The file needs NumPy, and MuJoCo where it is installed in a model; nothing of excite. Its functions are pure,
 //! and take the array module (NumPy, JAX, Torch) as an argument.
@@ -57,16 +57,8 @@ impl Format for Effects {
     }
 
     fn write(&self, model: &Model) -> Result<String> {
-        text(model)
+        functions(model)
     }
-}
-
-/// The file of a model whether it has effects or not: what `effects.py` has beside them serves any model.
-///
-/// # Errors
-/// A closed chain whose loops cannot be written.
-pub fn functions(model: &Model) -> Result<String> {
-    text(model)
 }
 
 /// Tables that the functions stand in, line by line.
@@ -83,7 +75,11 @@ struct Tables {
     loaded: bool,
 }
 
-fn text(model: &Model) -> Result<String> {
+/// The file of a model whether it has effects or not: what `effects.py` has beside them serves any model.
+///
+/// # Errors
+/// A closed chain whose loops cannot be written.
+pub fn functions(model: &Model) -> Result<String> {
     let (robot, zeros) = (model.robot, closed::zeros(model)?);
     let chain = zeros.is_some();
     let drives: Vec<&Joint> = model

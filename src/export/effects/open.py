@@ -39,26 +39,16 @@ class Installed:
         import mujoco
 
         q, dq = data.qpos[self.at], data.qvel[self.dof]
-        time, before = self.memory.get(data._address, (np.inf, None))
-        if data.time < time:
-            # a new run
-            time, before = data.time, start(q)
+        passed, before = recalled(self.memory, data, q)
         # with the acceleration of the last step, or that which mj_inverse is asked for
         mujoco.mj_rne(model, data, 1, self.load)
-        dry, other, after = parts(q, dq, self.load[self.dof], data.time - time, before)
+        dry, other, after = parts(q, dq, self.load[self.dof], passed, before)
         self.memory[data._address] = (data.time, after)
-        friction = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
+        kind = mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF
         for j, dof in enumerate(self.dof):
             force, level = float(other[j]), float(dry[j]) + self.loss[j]
             if level != 0.0:
-                # the solver's own friction holds what can be held, exactly at standstill
-                for row in np.flatnonzero(friction & (data.efc_id[: data.nefc] == dof)):
-                    level += model.dof_frictionloss[dof]
-                    data.efc_frictionloss[row] = max(level, 0.0)
-                    if getattr(data, "nisland", 0) and row < len(data.map_efc2iefc):
-                        # the copy that the solver of mj_step reads
-                        data.iefc_frictionloss[data.map_efc2iefc[row]] = max(level, 0.0)
-                    level = min(level, 0.0)
+                level = held(data, kind, dof, model.dof_frictionloss[dof], level)
                 # along a motion the sign of the velocity is known
                 known = self.loss[j] > 0.0
                 force += level * float(np.sign(dq[j]) if known else np.tanh(dq[j] / WIDTH[j]))
@@ -181,7 +171,4 @@ def inverse(model, q, dq, ddq, dt, memory=None, substep=2e-4):
         model.dof_frictionloss[here.dof] = here.loss
     if memory is not None:
         memory.update(here.memory[data._address][1])
-    tau, times = reported(tau), dt * np.arange(len(q))
-    for j, seconds in DELAYED:
-        tau[:, j] = np.interp(times - seconds, times, tau[:, j])
-    return tau
+    return logged(tau, dt)

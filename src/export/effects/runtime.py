@@ -49,5 +49,40 @@ def command(told, xp=np):
         for j, f, native in DRIVES:
             if not native:
                 less[j] = less[j] + f(tau[..., j], xp) - tau[..., j]
-        tau = 0.5 * tau + 0.5 * (told - xp.stack(less, -1))
+        before, tau = tau, 0.5 * tau + 0.5 * (told - xp.stack(less, -1))
+        if xp is np and np.array_equal(before, tau):
+            break
+    return tau
+
+
+def recalled(memory, data, q):
+    """Time since the effects were last asked for in this data, s, and what they remember from then."""
+    time, before = memory.get(data._address, (np.inf, None))
+    if data.time < time:
+        # a new run
+        time, before = data.time, start(q)
+    return data.time - time, before
+
+
+def held(data, kind, on, loss, level):
+    """What is left of a level of dry friction, N m or N, behind the solver's own, which holds exactly at standstill.
+
+    kind, on: rows of the solver that have this friction, and what they act on; loss: its level in the model.
+    """
+    count = data.nefc
+    for row in np.flatnonzero((data.efc_type[:count] == kind) & (data.efc_id[:count] == on)):
+        level += loss
+        data.efc_frictionloss[row] = max(level, 0.0)
+        if getattr(data, "nisland", 0) and row < len(data.map_efc2iefc):
+            # the copy that the solver of mj_step reads
+            data.iefc_frictionloss[data.map_efc2iefc[row]] = max(level, 0.0)
+        level = min(level, 0.0)
+    return level
+
+
+def logged(tau, dt):
+    """What the log of the drives shows where they make tau (samples, joints) every dt, s: gains, limits, delays."""
+    tau, times = reported(tau), dt * np.arange(len(tau))
+    for j, seconds in DELAYED:
+        tau[:, j] = np.interp(times - seconds, times, tau[:, j])
     return tau
