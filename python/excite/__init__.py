@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ._errors import Error, ExciteWarning, Notice
     from ._excite import __version__
     from ._planned import Assessment, Design, Export, Interrupted, Simulation
-    from ._posterior import Posterior
+    from ._posterior import Diagnosed, Posterior
     from ._records import Experiment, Record
     from ._results import Calibration, Diagnosis, Identification, Load, PoseDiagnosis, Result
     from ._robot import BaseParameters, Parameter, Robot
@@ -46,7 +46,7 @@ _PARTS = {
     "_condense": ("Factor", "Merged", "condense", "merge"),
     "_errors": ("Error", "ExciteWarning", "Notice"),
     "_excite": ("__version__",),
-    "_posterior": ("Posterior",),
+    "_posterior": ("Diagnosed", "Posterior"),
     "_records": ("Experiment", "Record"),
     "_planned": ("Assessment", "Design", "Export", "Interrupted", "Simulation"),
     "_results": ("Calibration", "Diagnosis", "Identification", "Load", "PoseDiagnosis", "Result"),
@@ -63,6 +63,7 @@ __all__ = [
     "Calibration",
     "Command",
     "Design",
+    "Diagnosed",
     "Diagnosis",
     "Error",
     "ExciteWarning",

@@ -11,6 +11,7 @@ a prior ``S_k ~ N(0, 1/gamma)`` that were drawn,
 
 from __future__ import annotations
 
+import csv
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Dict, List, Optional, Tuple, Union
@@ -64,51 +65,99 @@ def ten_of(j: Array) -> Array:
     return np.stack(first + tensor, axis=-1)
 
 
-class Posterior:
-    """Samples of what the data and the prior leave open. Made by :meth:`excite.Identification.sample`."""
+class Drawn:
+    """Robots that records do not exclude."""
 
-    def __init__(
-        self, robot: Robot, names: List[str], units: List[str], values: Array, best: Array, inflation: float
-    ) -> None:
-        #: the identified robot
-        self.robot = robot
-        #: names of the parameters
+    def __init__(self, names: List[str], units: List[str], values: Array) -> None:
+        #: names of the columns of the table
         self.names = names
         #: their units
         self.units = units
-        #: one row a sample, ``(n, p)``
+        #: one row a sample, ``(n, columns)``
         self.values = values
-        #: the identified values, ``(p,)``
-        self.best = best
-        #: factor on the variances because what the model leaves is correlated in time
-        self.inflation = inflation
 
     def __len__(self) -> int:
         return len(self.values)
 
     def files(self, k: int) -> Dict[str, str]:
         """The robot files of a sample: texts by name."""
-        found = self.robot._plant.files(self.values[k].tolist())
-        return {name: text for name, text, _ in found if text is not None}
+        raise NotImplementedError
 
     def sampled(self, k: int) -> Robot:
         """The robot of a sample."""
         files = self.files(k)
-        return Robot._from_files({n: t for n, t in files.items() if n != "robot.xml"}, "robot.toml")
+        own = {n: t for n, t in files.items() if n in ("robot.toml", "robot.urdf")}
+        return Robot._from_files(own, "robot.toml")
 
     def to_frame(self) -> Any:
         """One row a sample as a pandas ``DataFrame``."""
         return pandas().DataFrame(self.values, columns=self.names)
 
+    def table(self) -> str:
+        """The text of ``samples.csv``."""
+        return _excite.table(self.names, [np.ascontiguousarray(c) for c in self.values.T])
+
     def save(self, folder: PathLike, *, force: bool = False) -> List[Path]:
         """Write ``samples.csv`` and a folder of robot files for each sample."""
         folder = Path(os.fspath(folder))
-        text = _excite.table(self.names, [np.ascontiguousarray(c) for c in self.values.T])
-        paths = _excite.save(folder, [("samples.csv", text.encode())], [], force)
+        paths = _excite.save(folder, [("samples.csv", self.table().encode())], [], force)
         for k in range(len(self)):
             files = [(n, t.encode()) for n, t in self.files(k).items()]
             paths += _excite.save(folder / f"sample_{k + 1:04d}", files, [], force)
         return paths
+
+
+class Diagnosed(Drawn):
+    """Robots that the records of a diagnosis do not exclude: effects and their rivals stand in them as often as they are
+    believed, with what records and prior leave open of all values. See :attr:`excite.Diagnosis.samples`."""
+
+    def __init__(self, about: Dict[str, Any], texts: Dict[str, str]) -> None:
+        table = texts["samples.csv"]
+        rows = list(csv.reader(table.splitlines()))[1:]
+        columns = about["columns"]
+        values = np.array([[float(c) if c else np.nan for c in row[1:]] for row in rows])
+        super().__init__(
+            [c["name"] for c in columns], [c["unit"] for c in columns], values.reshape(len(rows), len(columns))
+        )
+        #: the effects of each sample: a list of ``effect`` and ``place``
+        self.effects: List[List[Dict[str, str]]] = about["effects"]
+        #: how their band for 95 % does on records held out: ``covered``, and joint by joint ``covered``, ``spread`` of the samples,
+        #: what the fit ``left`` and ``twenty_percent`` on every parameter, N m or N; ``None`` and empty without such records
+        self.coverage: Dict[str, Any] = {"covered": about["covered"], "joints": about["joints"]}
+        self._table, self._texts = table, texts
+
+    def files(self, k: int) -> Dict[str, str]:
+        """The robot files of a sample: texts by name."""
+        head = f"sample_{range(len(self))[k] + 1:04d}/"
+        return {name[len(head) :]: text for name, text in self._texts.items() if name.startswith(head)}
+
+    def table(self) -> str:
+        """The text of ``samples.csv``."""
+        return self._table
+
+    def __repr__(self) -> str:
+        kinds = len({str(e) for e in self.effects})
+        return f"<excite.Diagnosed: {len(self)} samples with {kinds} sets of effects>"
+
+
+class Posterior(Drawn):
+    """Samples of what the data and the prior leave open. Made by :meth:`excite.Identification.sample`."""
+
+    def __init__(
+        self, robot: Robot, names: List[str], units: List[str], values: Array, best: Array, inflation: float
+    ) -> None:
+        super().__init__(names, units, values)
+        #: the identified robot
+        self.robot = robot
+        #: the identified values, ``(p,)``
+        self.best = best
+        #: factor on the variances because what the model leaves is correlated in time
+        self.inflation = inflation
+
+    def files(self, k: int) -> Dict[str, str]:
+        """The robot files of a sample: texts by name."""
+        found = self.robot._plant.files(self.values[k].tolist())
+        return {name: text for name, text, _ in found if text is not None}
 
     def torque(self, q: Any, dq: Any = None, ddq: Any = None) -> Array:
         """Torques of all samples, N m or N, ``(n, samples, joints)``; states as for :meth:`excite.Robot.torque`."""

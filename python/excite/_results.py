@@ -268,7 +268,7 @@ class Diagnosis(_Model):
     """Why a model and its robot disagree."""
 
     _file = "diagnosis.json"
-    _may: Tuple[str, ...] = ("robot.urdf", "robot.xml", "robot.toml", "effects.py", "next.json")
+    _may: Tuple[str, ...] = ("robot.urdf", "robot.xml", "robot.toml", "effects.py", "next.json", "samples.csv")
     _rows = "findings"
 
     @classmethod
@@ -278,10 +278,14 @@ class Diagnosis(_Model):
         self = cls.__new__(cls)
         try:
             self._json = (folder / cls._file).read_text(encoding="utf-8")
+            self._value = json.loads(self._json)
             self._page = (folder / "report.html").read_text(encoding="utf-8")
             there = [name for name in cls._may if (folder / name).is_file()]
+            # those of this diagnosis, and none that an earlier one left
+            count = self._value["samples"]["count"] if "samples" in self._value else 0
+            own = [f"sample_{k + 1:04d}" for k in range(count)]
+            there += [f"{k}/{name}" for k in own for name in cls._may if (folder / k / name).is_file()]
             self._files = {name: (folder / name).read_text(encoding="utf-8") for name in there}
-            self._value = json.loads(self._json)
             self.warnings = [Notice(w["kind"], w["subject"], w["message"]) for w in self._value["warnings"]]
         except (OSError, ValueError, KeyError, TypeError) as e:
             raise unusable(f"{folder} is no folder of a diagnosis: {e}") from None
@@ -323,6 +327,12 @@ class Diagnosis(_Model):
             # of a parallel robot the URDF alone is its open tree
             raise unusable("no robot file could be written that closes the loops; see .warnings")
         return robot
+
+    @property
+    def samples(self) -> Optional[_posterior.Diagnosed]:
+        """Robots that the records do not exclude, where ``samples`` asked for some."""
+        about = self._value.get("samples")
+        return None if about is None else _posterior.Diagnosed(about, self._files)
 
     @property
     def next(self) -> Optional[Trajectory]:

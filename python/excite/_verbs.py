@@ -290,6 +290,7 @@ def diagnose(
     *,
     next: bool = True,
     next_tries: int = 64,
+    samples: int = 0,
     seed: int = 1,
     atmosphere: float = 101_325.0,
     progress: Progress = None,
@@ -299,14 +300,21 @@ def diagnose(
 
     Args:
         experiment: an experiment; or the path of a ``calibration.toml``, which is diagnosed for the geometry that the robot
-            lacks and gives a :class:`PoseDiagnosis` (``next`` and ``seed`` alone matter then).
+            lacks and gives a :class:`PoseDiagnosis` (``next`` and ``seed`` alone are asked for then).
         next: whether the next motion is designed.
         next_tries: random steps by which the best design of it is improved.
-        seed: of its random starts.
+        samples: robots to draw from what the records do not exclude, for what you randomise (:attr:`Diagnosis.samples`):
+            effects and their rivals by their confidence, all values with them.
+        seed: of the random starts of that motion, and of the samples.
         atmosphere: pressure outside of the cylinders, Pa, for records with chamber pressures in place of forces.
         progress: as for :func:`design`.
     """
+    samples = _integer("samples", samples)
+    if samples > 9999:
+        raise unusable(f"samples: at most 9999 robots are drawn, not {samples}")
     if isinstance(experiment, (str, os.PathLike)) and _excite.is_calibration(Path(os.fspath(experiment))):
+        if samples:
+            raise unusable("samples are of an experiment; this is a calibration")
         poses = PoseDiagnosis(
             _excite.diagnose_poses(Path(os.fspath(experiment)), next=bool(next), seed=_integer("seed", seed))
         )
@@ -318,6 +326,7 @@ def diagnose(
             core,
             next=bool(next),
             next_tries=_integer("next_tries", next_tries),
+            samples=samples,
             seed=_integer("seed", seed),
             atmosphere=_pressure(atmosphere),
             progress=bar.report,

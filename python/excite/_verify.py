@@ -137,7 +137,7 @@ def verify(
     if found is None:
         with Bar(progress, "diagnose") as bar:
             report = _excite.diagnose(
-                core, next=False, next_tries=0, seed=1, atmosphere=101_325.0, progress=bar.report
+                core, next=False, next_tries=0, samples=0, seed=1, atmosphere=101_325.0, progress=bar.report
             )
         found = Diagnosis(report)
     if found.to_dict()["joints"] != robot.joints:

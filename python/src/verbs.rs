@@ -11,6 +11,7 @@ use excite::calibrate::gap;
 use excite::calibrate::parts::Algorithm;
 use excite::cli::{export as program, identify as terms, pretty, unwritten};
 use excite::controller::{Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
+use excite::diagnose::parts::{Posterior, TABLE};
 use excite::export::parts::Model;
 use excite::export::write;
 use excite::{Error, Result, calibrate as calibration, diagnose as diagnosis};
@@ -152,18 +153,21 @@ pub fn load(
 
 /// Diagnoses the gap.
 #[pyfunction]
-#[pyo3(signature = (experiment, *, next, next_tries, seed, atmosphere, progress))]
+#[pyo3(signature = (experiment, *, next, next_tries, samples, seed, atmosphere, progress))]
+#[allow(clippy::too_many_arguments)]
 pub fn diagnose(
     py: Python<'_>,
     experiment: &Experiment,
     next: bool,
     next_tries: usize,
+    samples: usize,
     seed: u64,
     atmosphere: f64,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
     let core = experiment.core.clone();
     let mut settings = diagnosis::Settings::default();
+    settings.samples = samples;
     settings.next = next;
     settings.next_tries = next_tries.min(10_000);
     settings.seed = seed;
@@ -183,6 +187,13 @@ pub fn diagnose(
         d.warnings.extend(more);
         let json = pretty(&diagnosis::json::json(&d, begin.elapsed().as_secs_f64()));
         let mut files = texts(robots);
+        if let Some(p) = &d.posterior {
+            files.push((TABLE.into(), p.csv()));
+            for k in 0..p.samples.len() {
+                let own = texts(p.files(&core.plant, k)).into_iter();
+                files.extend(own.map(|(n, t)| (format!("{}/{n}", Posterior::folder(k)), t)));
+            }
+        }
         if let Some(n) = &d.next {
             files.push(("next.json".into(), n.trajectory.to_json()?));
         }

@@ -90,3 +90,32 @@ def test_bad(model, experiment):
             model.sample(n, seed)
     with pytest.raises(excite.Error, match="share"):
         model.sample(2).coverage(experiment, level=2)
+
+
+def test_samples_of_a_diagnosis_have_its_effects(experiment, tmp_path):
+    robot = experiment.robot
+    plans = [excite.design(robot, seed=s, starts=2, period=4, identify=["viscous", "coulomb"]) for s in (1, 2)]
+    logs = []
+    for plan, use in zip(plans, ["fit", "holdout"]):
+        run = excite.simulate(robot, plan, periods=3, rate=250, perturb=0.05).record(use, name=use)
+        tau = np.array(run.tau)
+        tau[:, 1] *= 1.25
+        logs.append(run.but(tau=tau))
+    found = excite.diagnose(excite.Experiment(robot, logs), next=False, samples=12)
+    drawn = found.samples
+    assert len(drawn) == 12 and excite.diagnose(excite.Experiment(robot, logs), next=False).samples is None
+    assert any(drawn.effects) and found.claims[0]["effect"] in {e["effect"] for s in drawn.effects for e in s}
+    assert 0.85 < drawn.coverage["covered"] < 1.0
+    # a row is the robot of its files
+    own = [drawn.names.index(p.name) for p in robot.parameters]
+    q, dq = np.array([[0.3, -0.8]]), np.array([[0.4, 0.2]])
+    for k in range(12):
+        assert drawn.sampled(k).torque(q, dq) == pytest.approx(robot.torque(q, dq, None, drawn.values[k, own]), rel=1e-9)
+        assert any(np.isfinite(drawn.values[k, len(own) :])) == bool(drawn.effects[k])
+    found.save(tmp_path)
+    again = excite.Diagnosis.read(tmp_path).samples
+    assert np.array_equal(again.values, drawn.values, equal_nan=True) and again.files(11) == drawn.files(11)
+    drawn.save(tmp_path / "own")
+    assert (tmp_path / "own/samples.csv").read_text() == (tmp_path / "samples.csv").read_text()
+    with pytest.raises(excite.Error):
+        excite.diagnose(excite.Experiment(robot, logs), samples=-1)

@@ -3,12 +3,13 @@
 mod poses;
 
 use super::{Folder, into, outside, pretty, print, unwritten, warn};
-use excite::Result;
+use excite::diagnose::parts::{Posterior, TABLE};
 use excite::diagnose::{Settings, diagnose, json, page};
 use excite::export;
 use excite::export::parts::Model;
 use excite::log::Experiment;
 use excite::report::format::{percent, significant};
+use excite::{Error, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -53,7 +54,11 @@ pub struct Args {
         help = "Random steps by which the best design of that motion is improved; counted, so that the same seed gives the same motion [default: 64]"
     )]
     next_tries: Option<usize>,
-    /// Seed of the random starts of that design
+    /// Draw N robots that the records do not exclude, for what you randomise: effects and their rivals by their
+    /// confidence, all values with them; writes samples.csv and a folder of robot files for each
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+    /// Seed of the random starts of that design, and of the samples
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are
@@ -63,6 +68,27 @@ pub struct Args {
     /// Print diagnosis.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
+}
+
+/// Robots that are drawn at most.
+const MOST: usize = 9999;
+
+/// The folder of sample `k`, with nothing in the way of its files.
+fn samples(args: &Args, experiment: &Experiment, k: usize) -> Result<Folder> {
+    let folder = args.output.join(Posterior::folder(k));
+    Folder::new(&folder, &export::files(&experiment.plant), args.force)
+}
+
+/// Removes the robot files of samples from number `k` on that an earlier run left.
+fn outdated(args: &Args, k: usize) -> Result<()> {
+    let left = (k..MOST).map(|k| args.output.join(Posterior::folder(k)));
+    for dir in left.take_while(|dir| args.force && dir.is_dir()) {
+        let folder = Folder::new(&dir, &[], true)?;
+        folder.robot(Vec::new())?;
+        // what else is in it stays
+        let _ = std::fs::remove_dir(dir);
+    }
+    Ok(())
 }
 
 pub fn run(args: Args) -> Result<()> {
@@ -78,10 +104,21 @@ pub fn run(args: Args) -> Result<()> {
     names.extend(further.iter().map(|f| f.file()));
     let scene = into::planned(&experiment.plant, args.into.as_deref(), &args.output)?;
     names.extend(scene.iter().map(String::as_str));
+    names.push(TABLE);
     let folder = Folder::new(&args.output, &names, args.force)?;
+    let count = args.samples.unwrap_or(0);
+    if count > MOST {
+        return Err(Error::Argument(format!(
+            "--samples draws at most {MOST} robots, not {count}"
+        )));
+    }
+    let samples = (0..count)
+        .map(|k| samples(&args, &experiment, k))
+        .collect::<Result<Vec<_>>>()?;
     let settings = Settings {
         next: !args.no_next,
         next_tries: args.next_tries.unwrap_or(64).min(10_000),
+        samples: count,
         seed: args.seed,
     };
     // drawn only where standard error is a terminal
@@ -114,6 +151,16 @@ pub fn run(args: Args) -> Result<()> {
     folder.write("report.html", &page::html(&d))?;
     folder.robot(texts)?;
     into::save(&folder, d.improved.scene.as_ref())?;
+    match &d.posterior {
+        Some(p) => {
+            folder.write(TABLE, &p.csv())?;
+            for (k, folder) in samples.iter().enumerate().take(p.samples.len()) {
+                folder.robot(p.files(&experiment.plant, k))?;
+            }
+        }
+        None => folder.remove(TABLE)?,
+    }
+    outdated(&args, d.posterior.as_ref().map_or(0, |p| p.samples.len()))?;
     match &d.next {
         Some(n) => n.trajectory.write(folder.path("next.json"), args.force)?,
         None => folder.remove("next.json")?,
@@ -171,6 +218,21 @@ pub fn run(args: Args) -> Result<()> {
         let _ = writeln!(out, "\nin MuJoCo\n{}", changed.join("\n"));
     }
     out += &into::summary(d.improved.scene.as_ref());
+    if let Some(p) = &d.posterior {
+        let _ = writeln!(
+            out,
+            "\nsamples: {} robots in {}{}",
+            p.samples.len(),
+            folder.path(TABLE).display(),
+            match p.covered() {
+                Some(covered) => format!(
+                    " and folders; the band for 95 % covers {} of the torque on holdout",
+                    percent(covered)
+                ),
+                None => " and folders".into(),
+            }
+        );
+    }
     if let Some(n) = &d.next {
         let _ = writeln!(
             out,

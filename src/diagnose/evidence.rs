@@ -15,10 +15,12 @@
 //! `ηᵀ Λ_e η / ηᵀZᵀZη`.
 
 mod algebra;
+mod draw;
 mod left;
 mod nominal;
 
 pub use algebra::solve;
+pub use draw::Draws;
 
 use super::column::Column;
 use super::data::Data;

@@ -78,7 +78,8 @@ pub fn findings(
     all
 }
 
-fn names(cx: &Context, place: &Place) -> Vec<String> {
+/// Names of the actuators of a place; none for the whole robot.
+pub(super) fn names(cx: &Context, place: &Place) -> Vec<String> {
     let actuators = cx.data.plant.actuators();
     let named = place.named().into_iter();
     named.map(|j| actuators[j].name.clone()).collect()

@@ -39,6 +39,15 @@ pub struct Shares {
     pub non_periodic: Option<f64>,
 }
 
+/// Residuals in units of the noise.
+pub fn scaled(data: &Data, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    residual
+        .iter()
+        .enumerate()
+        .map(|(j, e)| e.iter().map(|v| v / data.noise[j].std).collect())
+        .collect()
+}
+
 /// Energy of a whitened residual above the noise in one record of one actuator: what repeats, and
 /// what does not. The residual is zero where nothing was measured or the actuator stood.
 pub fn excess(record: &Series, j: usize, e: &[f64]) -> (f64, f64) {

@@ -13,10 +13,10 @@
 
 use super::catalogue::{self, Context, Effect, Estimate};
 use super::evidence::Evidence;
-use super::finding::Finding;
+use super::finding::{Finding, names};
 use super::forward::effects_torque;
+use super::gap;
 use super::thresholds::THRESHOLDS as T;
-use super::{gap, result};
 use crate::error::{Warning, WarningKind};
 use crate::export::{self, Remark};
 use crate::identify::consistent::{self, Prior};
@@ -54,17 +54,21 @@ pub fn improve(
     let (data, plant) = (cx.data, cx.data.plant);
     let count = plant.parameters().len();
     let left = |e: &[Vec<f64>]| -> f64 {
-        let held = gap::energies(data, &result::scaled(data, e), |r| !r.fit);
+        let held = gap::energies(data, &gap::scaled(data, e), |r| !r.fit);
         held.iter().flatten().sum()
     };
-    let found = written(evidence, cx, effects, &phi[..count], findings);
+    let claims: Vec<Claim> = findings
+        .iter()
+        .filter(|f| f.is_claim())
+        .filter_map(|f| Some((named(effects, f)?, estimate(f))))
+        .collect();
+    let found = written(evidence, cx, &phi[..count], &claims);
     if !data.predicts() {
         return (found.improved, found.warnings);
     }
-    let claimed = findings.iter().filter_map(|f| {
-        let effect = named(effects, f).filter(|_| f.is_claim())?;
-        Some((effect, f.place, &f.shape, &f.eta[..]))
-    });
+    let claimed = claims
+        .iter()
+        .map(|(effect, e)| (*effect, e.place, &e.shape, &e.eta[..]));
     let mut values = data.without_allowance(phi);
     values[..count].copy_from_slice(&found.values);
     let mut torque = data.model_torque(&values);
@@ -76,7 +80,7 @@ pub fn improve(
         return (found.improved, found.warnings);
     }
     // a file that predicts worse than the model that is there helps nobody
-    let nominal = written(evidence, cx, effects, &evidence.phi[..count], &[]);
+    let nominal = written(evidence, cx, &evidence.phi[..count], &[]);
     let mut warnings = nominal.warnings;
     warnings.push(Warning::new(
         WarningKind::WorseThanNominal,
@@ -95,6 +99,19 @@ pub fn improve(
     (nominal.improved, warnings)
 }
 
+/// An effect that a model has.
+pub(super) type Claim<'e> = (&'e dyn Effect, Estimate);
+
+/// A finding as it was fitted.
+fn estimate(f: &Finding) -> Estimate {
+    Estimate {
+        place: f.place,
+        shape: f.shape.clone(),
+        eta: f.eta.clone(),
+        std: vec![0.0; f.eta.len()],
+    }
+}
+
 /// The effect of a finding.
 fn named<'e>(effects: &'e [Box<dyn Effect>], f: &Finding) -> Option<&'e dyn Effect> {
     let found = effects.iter().find(|e| e.card().name == f.effect);
@@ -102,54 +119,51 @@ fn named<'e>(effects: &'e [Box<dyn Effect>], f: &Finding) -> Option<&'e dyn Effe
 }
 
 /// A model for the files.
-struct Written {
-    improved: Improved,
-    warnings: Vec<Warning>,
+pub(super) struct Written {
+    /// the model
+    pub improved: Improved,
+    /// what is not as it was fitted
+    pub warnings: Vec<Warning>,
+    /// whether its bodies can exist
+    pub able: bool,
     /// parameters that go with the torque of the effects: those fitted, with what bodies that can exist change of them
-    values: Vec<f64>,
+    pub values: Vec<f64>,
 }
 
-fn written(
+/// The model with parameters and effects as files hold it.
+pub(super) fn written(
     evidence: &Evidence,
     cx: &Context,
-    effects: &[Box<dyn Effect>],
     phi: &[f64],
-    findings: &[Finding],
+    effects: &[Claim],
 ) -> Written {
     let plant = cx.data.plant;
     let mut robot = plant.with_values(phi);
     let mut remarks = Vec::new();
-    for f in findings.iter().filter(|f| f.is_claim()) {
-        let Some(effect) = named(effects, f) else {
-            continue;
-        };
-        let estimate = Estimate {
-            place: f.place,
-            shape: f.shape.clone(),
-            eta: f.eta.clone(),
-            std: vec![0.0; f.eta.len()],
-        };
+    for (effect, estimate) in effects {
+        let card = effect.card();
+        let joints = names(cx, &estimate.place);
+        let values = effect.values(cx, estimate);
         remarks.push(Remark {
-            effect: f.effect,
-            place: match f.joints.is_empty() {
+            effect: card.name,
+            place: match joints.is_empty() {
                 true => "whole robot".to_string(),
-                false => f.joints.join(", "),
+                false => joints.join(", "),
             },
-            equation: f.equation,
-            values: f
-                .values
+            equation: card.equation,
+            values: values
                 .iter()
                 .map(|v| {
                     let line = format!("{} = {:.6} {}", v.name, v.value, v.unit);
                     line.trim_end().to_string()
                 })
                 .collect(),
-            held: effect.apply(cx, &estimate, &mut robot),
-            element: catalogue::element(cx, effect, &estimate),
+            held: effect.apply(cx, estimate, &mut robot),
+            element: catalogue::element(cx, *effect, estimate),
         });
     }
     let fitted = plant.values_in(&robot);
-    let warnings = able(plant, evidence, &mut robot);
+    let (able, warnings) = able(plant, evidence, &mut robot);
     let moved = plant.values_in(&robot);
     let moved = moved.iter().zip(&fitted).map(|(a, b)| a - b);
     let values = phi.iter().zip(moved).map(|(x, m)| x + m).collect();
@@ -168,12 +182,13 @@ fn written(
     Written {
         improved,
         warnings,
+        able,
         values,
     }
 }
 
-/// Turns the bodies of a robot into such that can exist.
-fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> Vec<Warning> {
+/// Turns the bodies of a robot into such that can exist, and whether that was possible.
+fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> (bool, Vec<Warning>) {
     let wanted = plant.values_in(robot);
     let mut same = robot.clone();
     plant.set_values(&mut same, &wanted);
@@ -184,7 +199,7 @@ fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> Vec<Warning> {
         .zip(&robot.bodies)
         .all(|(a, b)| a.inertia == b.inertia);
     if !held || export::impossible(plant, robot).is_empty() {
-        return Vec::new();
+        return (true, Vec::new());
     }
     let c = evidence.information(wanted.len());
     let d: Vec<f64> = (0..c.nrows())
@@ -205,24 +220,27 @@ fn able(plant: &Plant, evidence: &Evidence, robot: &mut Robot) -> Vec<Warning> {
                 .sum();
             let rows = (evidence.data.fitted * evidence.data.joints()).max(1) as f64;
             let rms = (cost / rows).sqrt();
-            match rms > T.improved.seen {
-                true => vec![Warning::new(
+            let seen = (rms > T.improved.seen).then(|| {
+                Warning::new(
                     WarningKind::InertiaImpossible,
                     &robot.name,
                     format!(
                         "the parameters that fit best are not those of bodies that can exist; those in the robot \
                          files can, and leave {rms:.2} times the noise more"
                     ),
-                )],
-                false => Vec::new(),
-            }
+                )
+            });
+            (true, seen.into_iter().collect())
         }
-        Err(e) => vec![Warning::new(
-            WarningKind::InertiaImpossible,
-            &robot.name,
-            format!(
-                "no bodies that can exist were found for the parameters of the robot files: {e}"
-            ),
-        )],
+        Err(e) => {
+            let none = Warning::new(
+                WarningKind::InertiaImpossible,
+                &robot.name,
+                format!(
+                    "no bodies that can exist were found for the parameters of the robot files: {e}"
+                ),
+            );
+            (false, vec![none])
+        }
     }
 }

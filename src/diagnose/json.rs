@@ -221,6 +221,22 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
     if let Some(scene) = &d.improved.scene {
         out["into"] = json!(scene);
     }
+    if let Some(p) = &d.posterior {
+        out["samples"] = json!({
+            "count": p.samples.len(),
+            "missing": p.missing,
+            "table": super::posterior::TABLE,
+            "columns": p.columns.iter().map(|(name, unit)| json!({ "name": name, "unit": unit })).collect::<Vec<_>>(),
+            "effects": p.samples.iter().map(|s| s.remarks.iter().map(|r| json!({
+                "effect": r.effect, "place": r.place,
+            })).collect::<Vec<_>>()).collect::<Vec<_>>(),
+            "covered": p.covered().map(number),
+            "joints": p.band.iter().map(|b| json!({
+                "joint": b.joint, "covered": number(b.covered), "left": number(b.left),
+                "spread": number(b.spread), "twenty_percent": number(b.twenty),
+            })).collect::<Vec<_>>(),
+        });
+    }
     if let Some(n) = &d.next {
         out["next_experiment"] = json!({
             "separates": n.separates,

@@ -53,6 +53,7 @@ pub mod outside;
 pub mod page;
 pub mod parts;
 pub(crate) mod payload;
+pub(crate) mod posterior;
 pub(crate) mod prior;
 pub(crate) mod result;
 mod reversal;
@@ -213,6 +214,10 @@ pub fn of_logs(
     let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
     let (improved, mut warnings) =
         improve::improve(&evidence, &cx, &effects, &phi_after, &findings, &frozen);
+    let posterior = (settings.samples > 0).then(|| {
+        progress("samples");
+        posterior::sample(&evidence, &cx, &effects, &decision, settings)
+    });
     warnings.extend(payload::warnings(logs));
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
     let at_rest = at_rest::find(&data, &units);
@@ -244,7 +249,7 @@ pub fn of_logs(
         progress("next experiment");
         next::propose(&evidence, &cx, &effects, &list, &findings, settings)
     });
-    let scaled = result::scaled(&data, &refit);
+    let scaled = gap::scaled(&data, &refit);
     Ok(Diagnosis {
         robot: plant.name().to_string(),
         joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
@@ -277,6 +282,7 @@ pub fn of_logs(
         ruled_out: result::ruled_out(&data, &list, &effects),
         phi: phi_after[..plant.parameters().len()].to_vec(),
         improved,
+        posterior,
         next: next.flatten(),
         forward,
         warnings,

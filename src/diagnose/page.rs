@@ -3,6 +3,7 @@
 mod effects;
 mod next;
 mod residuals;
+mod samples;
 mod second_encoder;
 mod simulated;
 mod simulators;
@@ -137,6 +138,7 @@ pub fn html(d: &Diagnosis) -> String {
         Section::new("How far it shrinks", effects::shrink(d)),
         Section::new("As the simulator's user sees it", simulated::simulated(d)),
         Section::new("In your simulator", simulators::simulators(d)),
+        Section::new("What to randomise", samples::samples(d)),
         Section::new("What to run next", next::next(d)),
         Section::new("What this data cannot say", summary::limits(d)),
         joints::order(d.joints.iter().map(String::as_str)),

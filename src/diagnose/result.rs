@@ -9,6 +9,7 @@ use super::gap::{self, JointGap, Shares};
 use super::improve::Improved;
 use super::next::{INVISIBLE, Proposal};
 use super::noise::Source;
+use super::posterior::Posterior;
 use super::prior::Closeness;
 use super::search::Candidate;
 use super::second_encoder::SecondEncoder;
@@ -85,6 +86,8 @@ pub struct Diagnosis {
     pub phi: Vec<f64>,
     /// the model with the effects that were claimed
     pub improved: Improved,
+    /// robots that the records do not exclude; `None` where none were asked for
+    pub posterior: Option<Posterior>,
     /// proposal for the next experiment
     pub next: Option<Proposal>,
     /// the robot simulated under the recorded torques, before and after
@@ -107,19 +110,10 @@ impl Diagnosis {
     }
 }
 
-/// Residuals in units of the noise.
-pub fn scaled(data: &Data, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    residual
-        .iter()
-        .enumerate()
-        .map(|(j, e)| e.iter().map(|v| v / data.noise[j].std).collect())
-        .collect()
-}
-
 /// Energies of the gap record by record from residuals in N m or N: of the frozen model, refitted, and
 /// with the effects, which goes with the parameters `phi`.
 pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec<RecordGap> {
-    let all = residuals.map(|e| scaled(data, e));
+    let all = residuals.map(|e| gap::scaled(data, e));
     let remarks = |k: usize, r: &Series| {
         let load = data.free_load_in_words(k, phi);
         r.remarks.iter().cloned().chain(load).collect()

@@ -8,7 +8,9 @@ pub struct Settings {
     pub next: bool,
     /// random steps by which that design is improved
     pub next_tries: usize,
-    /// seed of random starts
+    /// robots to draw from what the records do not exclude, none unless asked for
+    pub samples: usize,
+    /// seed of random starts and of these draws
     pub seed: u64,
 }
 
@@ -19,6 +21,7 @@ impl Default for Settings {
         Settings {
             next: true,
             next_tries: 64,
+            samples: 0,
             seed: 1,
         }
     }

@@ -6,9 +6,10 @@
 use crate::common::noise::normal;
 use crate::common::rng;
 use crate::common::shared::shared;
-use excite::diagnose::parts::Verdict;
+use excite::diagnose::parts::{Posterior, Sample, Verdict};
 use excite::diagnose::{Diagnosis, Settings, diagnose, json, of_logs, outside, page, prepare};
 use excite::dynamics::{Samples, Tree};
+use excite::export;
 use excite::log::parts::{Payload, Purpose};
 use excite::log::{Channels, Experiment, Record};
 use excite::plant::Plant;
@@ -619,6 +620,99 @@ fn reversals_of_a_simulator_may_be_sharper_than_those_of_the_log() {
             );
         }
     }
+}
+
+/// Samples of what the records leave open, of a drive whose gain is off.
+fn drawn(seed: u64) -> (Diagnosis, Posterior) {
+    let logs = logs(&mut |j, _, _, _, tau| if j == 0 { 0.12 * tau } else { 0.0 });
+    let settings = Settings::default().with(|set| {
+        set.next = false;
+        set.samples = 200;
+        set.seed = seed;
+    });
+    let d = of_logs(&robots().0, &logs, &settings, &|_| {}).expect("a diagnosis");
+    let posterior = d.posterior.clone().expect("samples");
+    (d, posterior)
+}
+
+#[test]
+fn samples_hold_an_effect_and_its_rivals_as_often_as_they_are_believed() {
+    let ((d, p), plant) = (drawn(1), robots().0);
+    assert_eq!((p.samples.len(), p.missing), (200, 0));
+    let main = &d.findings[0];
+    assert_eq!(
+        (main.effect, main.place.named()),
+        ("torque_constant", vec![0])
+    );
+    // the confidence, less what the same effect on the other joint takes
+    let place = main.joints.join(", ");
+    let with = |s: &&Sample| {
+        s.remarks
+            .iter()
+            .any(|r| (r.effect, &r.place) == (main.effect, &place))
+    };
+    let own = p.samples.iter().filter(with).count() as f64 / 200.0;
+    let any = p.samples.iter().filter(|s| !s.remarks.is_empty()).count() as f64 / 200.0;
+    println!(
+        "confidence {}, in {own}, any effect in {any}",
+        main.confidence
+    );
+    assert!(own < main.confidence + 0.1 && any > main.confidence - 0.1);
+    assert!(p.samples.iter().any(|s| !with(&s)), "a rival or nothing");
+    // its coefficient scatters as the report says, about what the report says
+    let column = format!("torque_constant/{place}/{}", main.values[0].name);
+    let at = p.columns.iter().position(|c| c.0 == column).expect(&column);
+    let values: Vec<f64> = p
+        .samples
+        .iter()
+        .map(|s| s.values[at])
+        .filter(|v| v.is_finite())
+        .collect();
+    assert_eq!(
+        values.len() as f64,
+        200.0 * own,
+        "a number where the effect is, none elsewhere"
+    );
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let std = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt();
+    let (value, said) = (
+        main.values[0].value,
+        main.values[0].std.expect("a deviation"),
+    );
+    println!("{mean} ± {std}, reported {value} ± {said}");
+    assert!((mean - value).abs() < 0.3 * said && (std / said - 1.0).abs() < 0.3);
+    // a row of the table is the robot of the files, whose bodies can exist
+    for s in &p.samples {
+        assert!(export::impossible(&plant, &s.robot).is_empty());
+        let held = plant.values_in(&s.robot);
+        assert_eq!(held, s.values[..held.len()]);
+    }
+    // what was held out lies in the band, of which the samples are a small part: reversals are what the fit leaves
+    for b in &p.band {
+        assert!(
+            b.covered > 0.9 && b.covered < 0.999,
+            "{}: {}",
+            b.joint,
+            b.covered
+        );
+        assert!(
+            b.spread < 0.1 * b.twenty,
+            "{}: {} {}",
+            b.joint,
+            b.spread,
+            b.twenty
+        );
+    }
+    let lines: Vec<_> = p.csv().lines().map(|l| l.split(',').count()).collect();
+    assert!(lines.len() == 201 && lines.iter().all(|n| *n == 1 + p.columns.len()));
+}
+
+#[test]
+fn samples_are_those_of_their_seed_on_any_number_of_threads() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let one = pool.expect("a pool").install(|| drawn(2)).1;
+    assert_eq!(one.csv(), drawn(2).1.csv());
+    assert_ne!(one.csv(), drawn(3).1.csv());
 }
 
 /// The first finding is a load of this mass in some of the records.

@@ -16,6 +16,7 @@ pub fn run(args: Args) -> Result<()> {
         ("also", !args.also.is_empty()),
         ("into", args.into.is_some()),
         ("next-tries", args.next_tries.is_some()),
+        ("samples", args.samples.is_some()),
         ("atmosphere", args.atmosphere.is_some()),
     ];
     if let Some((name, _)) = only.iter().find(|o| o.1) {

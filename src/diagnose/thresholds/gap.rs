@@ -107,6 +107,14 @@ pub struct Improved {
     /// Change of its torque by bodies that can exist that is worth a warning. Unit: noise deviations. Source: by
     /// hand.
     pub seen: f64,
+    /// Draws of one sample until one is a machine. Unit: count. Source: by hand.
+    pub tries: usize,
+    /// Longest part of a record that the report shows with the band of the samples. Unit: s. Source: by hand.
+    pub shown: f64,
 }
 
-pub(super) const IMPROVED: Improved = Improved { seen: 0.1 };
+pub(super) const IMPROVED: Improved = Improved {
+    seen: 0.1,
+    tries: 20,
+    shown: 10.0,
+};
