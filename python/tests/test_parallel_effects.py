@@ -43,8 +43,30 @@ EFFECTS = {
 }
 
 
+
+
+def warming():
+    """Friction that rises as a leg warms up, from one record to the next."""
+    warm = 0.0
+
+    def effect(q, v, f, load):
+        nonlocal warm
+        out = []
+        for x in v:
+            power = (25.0 * abs(x) + 80.0 * x**2) / (25.0 * 0.45 + 80.0 * 0.45**2)
+            warm += (power - warm) / (8.0 * RATE)
+            out.append(warm)
+        return f + np.array(out) * (40.0 * sign(v) + 150.0 * v)
+
+    return effect
+
+
+#: effects that remember, by what makes one that is new
+REMEMBER = {"thermal_friction": warming}
+
 #: whether the legs have mass, and the effects of the first drives
 LOGS = [
+    (False, ["thermal_friction"]),
     (True, ["load_dependent_friction", "torque_constant"]),
     (True, ["presliding_hysteresis", "cogging"]),
     (False, ["stribeck_friction"]),
@@ -57,7 +79,7 @@ LOGS = [
 
 
 def test_no_effect_is_left_out():
-    assert set(EFFECTS) == {e for _, effects in LOGS for e in effects}
+    assert {*EFFECTS, *REMEMBER} == {e for _, effects in LOGS for e in effects}
 
 
 def recorded(mass, effects):
@@ -65,16 +87,17 @@ def recorded(mass, effects):
     robot = hexapod(mass)
     motion = excite.Trajectory.read(Path(__file__).resolve().parents[2] / "trajectories/hexapod/trajectory.json")
     rng, records = np.random.default_rng(3), []
+    added = [REMEMBER[e]() if e in REMEMBER else EFFECTS.get(e, e) for e in effects]
     for seed, use in enumerate(["fit", "holdout"]):
         run = excite.simulate(
             robot, motion, periods=2 - seed, rate=RATE, noise=0.0, derivatives=True, seed=seed
         ).record(use, name=use)
         q, v, tau = (np.array(x, float) for x in (run.q, run.dq, run.tau))
-        for leg, effect in enumerate(effects):
+        for leg, effect in enumerate(added):
             f = tau[:, leg]
             # without the friction of the robot file
             load = f - 80.0 * v[:, leg] - 25.0 * sign(v[:, leg])
-            tau[:, leg] = EFFECTS.get(effect, effect)(q[:, leg], v[:, leg], f, load)
+            tau[:, leg] = effect(q[:, leg], v[:, leg], f, load)
         records.append(run.but(tau=tau + rng.normal(0.0, NOISE, tau.shape), dq=None, ddq=None))
     return excite.Experiment(robot, records)
 
