@@ -216,7 +216,7 @@ impl<'e> Fitted<'e> {
     fn draw(&self, evidence: &Evidence, cx: &Context, rng: &mut ChaCha8Rng) -> Option<Drawn<'e>> {
         let (plant, draws) = (cx.data.plant, self.draws.as_ref()?);
         for _ in 0..T.improved.tries {
-            let numbers: Vec<f64> = (0..draws.len()).map(|_| normal(rng)).collect();
+            let numbers: Vec<f64> = (0..draws.count()).map(|_| normal(rng)).collect();
             let (mut phi, eta) = draws.at(&numbers);
             friction(plant, &mut phi);
             let mut at = 0;
@@ -426,11 +426,12 @@ impl<'d, 'p> Gaps<'d, 'p> {
             self.first = gap.clone();
         }
         self.count += 1;
-        for j in 0..gap.len() {
-            for i in 0..gap[j].len() {
-                let d = gap[j][i] - self.first[j][i];
-                self.sum[j][i] += d;
-                self.square[j][i] += d * d;
+        let sums = self.sum.iter_mut().zip(&mut self.square);
+        for ((sum, square), (gap, first)) in sums.zip(gap.iter().zip(&self.first)) {
+            let change = gap.iter().zip(first).map(|(g, f)| g - f);
+            for ((s, q), d) in sum.iter_mut().zip(square).zip(change) {
+                *s += d;
+                *q += d * d;
             }
         }
     }

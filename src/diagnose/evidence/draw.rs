@@ -93,7 +93,7 @@ impl Draws {
     }
 
     /// How many numbers there are.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.mean.len()
     }
 }
