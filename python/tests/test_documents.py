@@ -24,7 +24,7 @@ def test_the_page_about_python(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {}
     found = blocks("docs/python.md")
-    assert len(found) == 5 and 8 <= len(found[0].strip().splitlines()) <= 12
+    assert len(found) == 6 and 8 <= len(found[0].strip().splitlines()) <= 12
     for block in found:
         # what would take ten minutes takes two seconds
         if "MySimulator" in block:
