@@ -65,6 +65,11 @@ def ten_of(j: Array) -> Array:
     return np.stack(first + tensor, axis=-1)
 
 
+def folder_of(k: int) -> str:
+    """Name of the folder of sample ``k``."""
+    return f"sample_{k + 1:04d}"
+
+
 class Drawn:
     """Robots that records do not exclude."""
 
@@ -103,7 +108,7 @@ class Drawn:
         paths = _excite.save(folder, [("samples.csv", self.table().encode())], [], force)
         for k in range(len(self)):
             files = [(n, t.encode()) for n, t in self.files(k).items()]
-            paths += _excite.save(folder / f"sample_{k + 1:04d}", files, [], force)
+            paths += _excite.save(folder / folder_of(k), files, [], force)
         return paths
 
 
@@ -128,7 +133,7 @@ class Diagnosed(Drawn):
 
     def files(self, k: int) -> Dict[str, str]:
         """The robot files of a sample: texts by name."""
-        head = f"sample_{range(len(self))[k] + 1:04d}/"
+        head = folder_of(range(len(self))[k]) + "/"
         return {name[len(head) :]: text for name, text in self._texts.items() if name.startswith(head)}
 
     def table(self) -> str:

@@ -283,7 +283,7 @@ class Diagnosis(_Model):
             there = [name for name in cls._may if (folder / name).is_file()]
             # those of this diagnosis, and none that an earlier one left
             count = self._value["samples"]["count"] if "samples" in self._value else 0
-            own = [f"sample_{k + 1:04d}" for k in range(count)]
+            own = [_posterior.folder_of(k) for k in range(count)]
             there += [f"{k}/{name}" for k in own for name in cls._may if (folder / k / name).is_file()]
             self._files = {name: (folder / name).read_text(encoding="utf-8") for name in there}
             self.warnings = [Notice(w["kind"], w["subject"], w["message"]) for w in self._value["warnings"]]

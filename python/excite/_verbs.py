@@ -310,8 +310,6 @@ def diagnose(
         progress: as for :func:`design`.
     """
     samples = _integer("samples", samples)
-    if samples > 9999:
-        raise unusable(f"samples: at most 9999 robots are drawn, not {samples}")
     if isinstance(experiment, (str, os.PathLike)) and _excite.is_calibration(Path(os.fspath(experiment))):
         if samples:
             raise unusable("samples are of an experiment; this is a calibration")

@@ -11,7 +11,7 @@ use excite::calibrate::gap;
 use excite::calibrate::parts::Algorithm;
 use excite::cli::{export as program, identify as terms, pretty, unwritten};
 use excite::controller::{Column, Course, FORMATS, Leg, Options, Playback, Unit, format};
-use excite::diagnose::parts::{Posterior, TABLE};
+use excite::diagnose::parts::{MOST, Posterior, TABLE};
 use excite::export::parts::Model;
 use excite::export::write;
 use excite::{Error, Result, calibrate as calibration, diagnose as diagnosis};
@@ -165,6 +165,11 @@ pub fn diagnose(
     atmosphere: f64,
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<Report> {
+    if samples > MOST {
+        return Err(crate::error::argument(format!(
+            "samples: at most {MOST} robots are drawn, not {samples}"
+        )));
+    }
     let core = experiment.core.clone();
     let mut settings = diagnosis::Settings::default();
     settings.samples = samples;

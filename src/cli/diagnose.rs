@@ -3,7 +3,7 @@
 mod poses;
 
 use super::{Folder, into, outside, pretty, print, unwritten, warn};
-use excite::diagnose::parts::{Posterior, TABLE};
+use excite::diagnose::parts::{MOST, Posterior, TABLE};
 use excite::diagnose::{Settings, diagnose, json, page};
 use excite::export;
 use excite::export::parts::Model;
@@ -70,19 +70,18 @@ pub struct Args {
     json: bool,
 }
 
-/// Robots that are drawn at most.
-const MOST: usize = 9999;
-
 /// The folder of sample `k`, with nothing in the way of its files.
 fn samples(args: &Args, experiment: &Experiment, k: usize) -> Result<Folder> {
     let folder = args.output.join(Posterior::folder(k));
     Folder::new(&folder, &export::files(&experiment.plant), args.force)
 }
 
-/// Removes the robot files of samples from number `k` on that an earlier run left.
+/// Removes folders of samples from number `k` on: those that were made for this run, and robot files that an earlier one left.
 fn outdated(args: &Args, k: usize) -> Result<()> {
-    let left = (k..MOST).map(|k| args.output.join(Posterior::folder(k)));
-    for dir in left.take_while(|dir| args.force && dir.is_dir()) {
+    let made = args.samples.unwrap_or(0);
+    let left =
+        (k..if args.force { MOST } else { made }).map(|k| args.output.join(Posterior::folder(k)));
+    for dir in left.take_while(|dir| dir.is_dir()) {
         let folder = Folder::new(&dir, &[], true)?;
         folder.robot(Vec::new())?;
         // what else is in it stays

@@ -30,6 +30,14 @@ impl Column {
         }
     }
 
+    /// Adds so many times the column to rows by actuator.
+    pub fn add_to(&self, factor: f64, rows: &mut [Vec<f64>]) {
+        for (j, values) in &self.rows {
+            let own = rows[*j].iter_mut().zip(values);
+            own.for_each(|(t, v)| *t += factor * v);
+        }
+    }
+
     /// Values on an actuator.
     pub fn get(&self, joint: usize) -> Option<&[f64]> {
         self.rows

@@ -127,6 +127,29 @@ pub struct Evidence<'a> {
     pub spread: Vec<f64>,
 }
 
+/// A symmetric matrix over the columns of a set from its blocks `(i, m)` with `m ≤ i`.
+fn assembled(set: &[&Projected], block: impl Fn(usize, usize) -> Mat<f64>) -> Mat<f64> {
+    let starts = set.iter().scan(0, |at, p| {
+        *at += p.z.len();
+        Some(*at - p.z.len())
+    });
+    let starts: Vec<usize> = starts.collect();
+    let k: usize = set.iter().map(|p| p.z.len()).sum();
+    let mut out = Mat::zeros(k, k);
+    for (i, at) in starts.iter().enumerate() {
+        for (m, to) in starts.iter().enumerate().take(i + 1) {
+            let block = block(i, m);
+            for x in 0..block.nrows() {
+                for y in 0..block.ncols() {
+                    out[(at + x, to + y)] = block[(x, y)];
+                    out[(to + y, at + x)] = block[(x, y)];
+                }
+            }
+        }
+    }
+    out
+}
+
 impl Evidence<'_> {
     /// `WᵀW` and `Wᵀr` over fitted rows, in units of the prior.
     pub fn normal_equations(&self) -> [Mat<f64>; 2] {
@@ -251,33 +274,18 @@ impl Evidence<'_> {
 
     /// Fits a set of effects together.
     pub fn fit(&self, set: &[&Projected]) -> Fit {
-        let sizes: Vec<usize> = set.iter().map(|p| p.z.len()).collect();
-        let k: usize = sizes.iter().sum();
-        let mut s = Mat::zeros(k, k);
-        let mut b = Vec::with_capacity(k);
-        let mut at = 0;
-        for (i, a) in set.iter().enumerate() {
-            let mut to = 0;
-            for (m, other) in set.iter().enumerate().take(i + 1) {
-                let block = if m == i {
-                    a.s.clone()
-                } else {
-                    self.cross(a, other)
-                };
-                for x in 0..sizes[i] {
-                    for y in 0..sizes[m] {
-                        s[(at + x, to + y)] = block[(x, y)];
-                        s[(to + y, at + x)] = block[(x, y)];
-                    }
-                }
-                to += sizes[m];
-            }
+        let mut s = assembled(set, |i, m| match i == m {
+            true => set[i].s.clone(),
+            false => self.cross(set[i], set[m]),
+        });
+        let mut b = Vec::with_capacity(s.nrows());
+        for a in set {
+            let at = b.len();
             // what is not visible must not be fitted: a ridge far below anything visible
-            for x in 0..sizes[i] {
+            for x in 0..a.z.len() {
                 s[(at + x, at + x)] += 1e-7 * a.raw[(x, x)] + 1e-9 + a.prior;
             }
             b.extend(a.b.iter().copied());
-            at += sizes[i];
         }
         solve(&s, &b)
     }

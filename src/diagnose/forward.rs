@@ -86,11 +86,7 @@ pub fn effects_torque<'e>(
     for (effect, place, shape, eta) in all {
         let columns = effect.columns(cx, &place, shape, false);
         for (column, eta) in columns.iter().zip(eta) {
-            for (j, values) in &column.rows {
-                for (t, v) in torque[*j].iter_mut().zip(values) {
-                    *t += eta * v;
-                }
-            }
+            column.add_to(*eta, &mut torque);
         }
     }
     torque

@@ -64,7 +64,7 @@ pub fn improve(
         .collect();
     let found = written(evidence, cx, &phi[..count], &claims);
     if !data.predicts() {
-        return (found.improved, found.warnings);
+        return found.improved(plant);
     }
     let claimed = claims
         .iter()
@@ -77,11 +77,11 @@ pub fn improve(
     }
     let [before, after] = [left(frozen), left(&data.gap_that_counts(&torque))];
     if after <= before + data.joints() as f64 * T.improved.seen.powi(2) {
-        return (found.improved, found.warnings);
+        return found.improved(plant);
     }
     // a file that predicts worse than the model that is there helps nobody
     let nominal = written(evidence, cx, &evidence.phi[..count], &[]);
-    let mut warnings = nominal.warnings;
+    let (improved, mut warnings) = nominal.improved(plant);
     warnings.push(Warning::new(
         WarningKind::WorseThanNominal,
         plant.name(),
@@ -96,7 +96,7 @@ pub fn improve(
                 .to_string(),
         },
     ));
-    (nominal.improved, warnings)
+    (improved, warnings)
 }
 
 /// An effect that a model has.
@@ -120,14 +120,35 @@ fn named<'e>(effects: &'e [Box<dyn Effect>], f: &Finding) -> Option<&'e dyn Effe
 
 /// A model for the files.
 pub(super) struct Written {
-    /// the model
-    pub improved: Improved,
+    /// bodies and joints
+    pub robot: Robot,
+    /// its effects
+    pub remarks: Vec<Remark>,
     /// what is not as it was fitted
     pub warnings: Vec<Warning>,
     /// whether its bodies can exist
     pub able: bool,
     /// parameters that go with the torque of the effects: those fitted, with what bodies that can exist change of them
     pub values: Vec<f64>,
+}
+
+impl Written {
+    /// The improved model, and what is not as it was fitted.
+    fn improved(self, plant: &Plant) -> (Improved, Vec<Warning>) {
+        let files = export::needed(&export::Model {
+            plant,
+            robot: &self.robot,
+            remarks: &self.remarks,
+        });
+        let improved = Improved {
+            in_mujoco: self.remarks.iter().map(|r| r.in_files(plant)).collect(),
+            robot: self.robot,
+            remarks: self.remarks,
+            files,
+            scene: None,
+        };
+        (improved, self.warnings)
+    }
 }
 
 /// The model with parameters and effects as files hold it.
@@ -167,20 +188,9 @@ pub(super) fn written(
     let moved = plant.values_in(&robot);
     let moved = moved.iter().zip(&fitted).map(|(a, b)| a - b);
     let values = phi.iter().zip(moved).map(|(x, m)| x + m).collect();
-    let files = export::needed(&export::Model {
-        plant,
-        robot: &robot,
-        remarks: &remarks,
-    });
-    let improved = Improved {
-        in_mujoco: remarks.iter().map(|r| r.in_files(plant)).collect(),
+    Written {
         robot,
         remarks,
-        files,
-        scene: None,
-    };
-    Written {
-        improved,
         warnings,
         able,
         values,

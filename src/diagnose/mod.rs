@@ -216,7 +216,7 @@ pub fn of_logs(
         improve::improve(&evidence, &cx, &effects, &phi_after, &findings, &frozen);
     let posterior = (settings.samples > 0).then(|| {
         progress("samples");
-        posterior::sample(&evidence, &cx, &effects, &decision, settings)
+        posterior::sample(&evidence, &cx, &effects, &decision, &after, settings)
     });
     warnings.extend(payload::warnings(logs));
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();

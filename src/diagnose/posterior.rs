@@ -32,6 +32,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::fmt::Write as _;
 
+/// Robots that the command line and Python draw at most.
+pub const MOST: usize = 9999;
+
 /// Table of all samples.
 pub const TABLE: &str = "samples.csv";
 
@@ -248,12 +251,8 @@ impl<'e> Fitted<'e> {
             }
             phi[..count].copy_from_slice(&model.values);
             let mut torque = cx.data.model_torque(&cx.data.without_allowance(&phi));
-            let all = self.columns.iter().flatten().zip(&eta);
-            for (column, eta) in all {
-                for (j, values) in &column.rows {
-                    let row = torque[*j].iter_mut().zip(values);
-                    row.for_each(|(t, v)| *t += eta * v);
-                }
+            for (column, eta) in self.columns.iter().flatten().zip(eta) {
+                column.add_to(eta, &mut torque);
             }
             return Some(Drawn {
                 model,
@@ -283,25 +282,22 @@ fn friction(plant: &Plant, phi: &mut [f64]) {
     }
 }
 
-/// Draws robots that the records do not exclude.
+/// Draws robots that the records do not exclude; `left` is what the fit of all members leaves of the torque.
 pub fn sample(
     evidence: &Evidence,
     cx: &Context,
     effects: &[Box<dyn Effect>],
     decision: &Decision,
+    left: &[Vec<f64>],
     settings: &Settings,
 ) -> Posterior {
     let of_members: Vec<Vec<Choice>> = decision.members.iter().map(choices).collect();
-    // every sample has numbers of its own, whatever the others and the threads do
-    let own = |k: usize| {
-        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ 0x0705_7e21);
-        rng.set_stream(k as u64);
-        rng
-    };
     let mut sets: Vec<Vec<Option<usize>>> = Vec::new();
     let mut drawn: Vec<(usize, ChaCha8Rng)> = Vec::new();
     for k in 0..settings.samples {
-        let mut rng = own(k);
+        // every sample has numbers of its own, whatever the others and the threads do
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ 0x0705_7e21);
+        rng.set_stream(k as u64);
         let members = decision.members.iter().zip(&of_members);
         let chosen: Vec<Option<usize>> = members.map(|(m, c)| choose(&mut rng, m, c)).collect();
         let known = sets.iter().position(|s| *s == chosen);
@@ -337,13 +333,11 @@ pub fn sample(
             }
         }
     }
-    let left = evidence.torque_left(&decision.projected());
-    let band = band.on_holdout(cx.data, &left, &evidence.phi);
     let (columns, samples) = table.filled();
     Posterior {
         columns,
         samples,
-        band,
+        band: band.on_holdout(left, &evidence.phi),
         missing,
     }
 }
@@ -364,7 +358,7 @@ impl Table {
     }
 
     fn add(&mut self, cx: &Context, drawn: Drawn) {
-        let robot = drawn.model.improved.robot;
+        let robot = drawn.model.robot;
         let mut values = cx.data.plant.values_in(&robot);
         values.resize(self.columns.len(), f64::NAN);
         for (effect, e) in &drawn.effects {
@@ -386,7 +380,7 @@ impl Table {
         }
         self.samples.push(Sample {
             robot,
-            remarks: drawn.model.improved.remarks,
+            remarks: drawn.model.remarks,
             values,
         });
     }
@@ -437,7 +431,8 @@ impl<'d, 'p> Gaps<'d, 'p> {
     }
 
     /// The band on the rows of records held out; `left` is what the fit leaves, `phi` the nominal parameters.
-    fn on_holdout(&self, data: &Data, left: &[Vec<f64>], phi: &[f64]) -> Vec<Band> {
+    fn on_holdout(&self, left: &[Vec<f64>], phi: &[f64]) -> Vec<Band> {
+        let data = self.data;
         if self.count < 2 || !data.predicts() {
             return Vec::new();
         }
@@ -445,14 +440,14 @@ impl<'d, 'p> Gaps<'d, 'p> {
         let actuators = data.plant.actuators();
         let one = |(j, actuator): (usize, &&Joint)| {
             let counts = |i: &usize| data.weights[j][*i] > 0.0;
-            let power = |rows: std::ops::Range<usize>, of: &dyn Fn(usize) -> f64| {
+            let mean = |rows: std::ops::Range<usize>, of: &dyn Fn(usize) -> f64| {
                 let all: Vec<f64> = rows.filter(counts).map(of).collect();
                 (all.iter().sum::<f64>() / all.len().max(1) as f64, all.len())
             };
-            let left = power(0..data.fitted, &|i| left[j][i].powi(2)).0;
+            let left = mean(0..data.fitted, &|i| left[j][i].powi(2)).0;
             let variance = |i: usize| {
-                let mean = self.sum[j][i] / n;
-                ((self.square[j][i] / n - mean * mean) * n / (n - 1.0)).max(0.0)
+                let middle = self.sum[j][i] / n;
+                ((self.square[j][i] / n - middle * middle) * n / (n - 1.0)).max(0.0)
             };
             let gap = |i: usize| self.first[j][i] + self.sum[j][i] / n;
             let half = |i: usize| BAND * (variance(i) + left).sqrt();
@@ -467,7 +462,7 @@ impl<'d, 'p> Gaps<'d, 'p> {
                 rows.map(|i| [i as f64 * dt, gap(span.start + i), half(span.start + i)])
                     .collect()
             });
-            let (covered, rows) = power(held.clone(), &within);
+            let (covered, rows) = mean(held.clone(), &within);
             // each parameter uniform within ±20 %
             let twenty = |i: usize| -> f64 {
                 let own = phi.iter().enumerate().take(data.plant.parameters().len());
@@ -478,8 +473,8 @@ impl<'d, 'p> Gaps<'d, 'p> {
                 joint: actuator.name.clone(),
                 covered,
                 left: left.sqrt(),
-                spread: power(held.clone(), &variance).0.sqrt(),
-                twenty: power(held, &twenty).0.sqrt(),
+                spread: mean(held.clone(), &variance).0.sqrt(),
+                twenty: mean(held, &twenty).0.sqrt(),
                 part,
             })
         };

@@ -1,6 +1,6 @@
 //! Draws from what the records and the prior leave open of parameters and coefficients together.
 
-use super::{Evidence, Fit, Projected};
+use super::{Evidence, Fit, Projected, assembled};
 use faer::{Mat, Side};
 
 /// Parameters `δ` and coefficients `η` about those of a fit, with the precision for noise of variance `s²`
@@ -35,28 +35,26 @@ impl Evidence<'_> {
             }
             a[(i, i)] += 1.0;
         }
+        // without what the parameters absorb
+        let own = assembled(set, |i, m| match i == m {
+            true => set[i].raw.clone(),
+            false => self.cross(set[i], set[m]) + set[i].c.transpose() * &set[m].c,
+        });
+        for x in 0..k {
+            for y in 0..k {
+                a[(p + x, p + y)] = weight * own[(x, y)];
+            }
+        }
         let mut at = p;
-        for (i, one) in set.iter().enumerate() {
+        for one in set {
             let mixed = &self.l * &one.c;
             for x in 0..one.z.len() {
                 for m in 0..p {
                     a[(m, at + x)] = weight * mixed[(m, x)];
                     a[(at + x, m)] = a[(m, at + x)];
                 }
+                a[(at + x, at + x)] += one.prior;
             }
-            let mut to = p;
-            for other in &set[..=i] {
-                let absorbed = one.c.transpose() * &other.c;
-                let both = self.cross(one, other) + absorbed;
-                for x in 0..one.z.len() {
-                    for y in 0..other.z.len() {
-                        a[(at + x, to + y)] = weight * both[(x, y)];
-                        a[(to + y, at + x)] = a[(at + x, to + y)];
-                    }
-                }
-                to += other.z.len();
-            }
-            (0..one.z.len()).for_each(|x| a[(at + x, at + x)] += one.prior);
             at += one.z.len();
         }
         let scale: Vec<f64> = (0..p + k)
