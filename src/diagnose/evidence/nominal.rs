@@ -3,8 +3,12 @@
 use super::Evidence;
 use super::algebra::dot;
 use crate::diagnose::data::Data;
+use faer::reborrow::Reborrow;
 use faer::{Mat, Side};
 use rayon::prelude::*;
+
+/// Rows that are decomposed at a time.
+const ROWS: usize = 4096;
 
 impl<'a> Evidence<'a> {
     /// With the prior of the data, its deviations multiplied by `loosen`.
@@ -72,13 +76,18 @@ impl<'a> Evidence<'a> {
                     w[(i, c)] *= spread[c];
                 }
             }
-            let mut t = w.transpose().to_owned();
-            faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-                l.as_ref(),
-                t.as_mut(),
-                faer::Par::Seq,
-            );
-            *w = t.transpose().to_owned();
+            // some rows at a time: a copy of all of them on every thread would be the most that a diagnosis holds
+            for from in (0..w.nrows()).step_by(ROWS) {
+                let rows = ROWS.min(w.nrows() - from);
+                let mut some = w.subrows_mut(from, rows);
+                let mut t = some.rb().transpose().to_owned();
+                faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+                    l.as_ref(),
+                    t.as_mut(),
+                    faer::Par::Seq,
+                );
+                some.copy_from(t.transpose());
+            }
         });
         let q = w;
         let mut d = vec![0.0; p];
