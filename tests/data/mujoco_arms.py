@@ -274,12 +274,13 @@ def main():
     parser.add_argument("--excite", type=Path, default=Path("target/release/excite"))
     parser.add_argument("--arms", type=int, default=34)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", type=int, nargs="+", help="numbers of the arms that are made, instead of all")
     parser.add_argument("--claim", type=float, default=0.5, help="least confidence of a name that counts")
     parser.add_argument("--output", type=Path, default=Path("target/mujoco_arms"))
     options = parser.parse_args()
     named = wrong = clean = quiet = hidden = 0
     with Pool(2) as pool:
-        for number, m, verdict, claims in pool.imap(case, ((k, options) for k in range(options.arms))):
+        for number, m, verdict, claims in pool.imap(case, ((k, options) for k in options.only or range(options.arms))):
             marks = [m.right(effect, joints) for effect, joints, _ in claims]
             said = "; ".join(
                 f"{effect} {','.join(joints)} {confidence:.2f}{'' if mark else ' WRONG'}"

@@ -147,6 +147,10 @@ pub trait Effect: Sync {
     fn sways(&self) -> bool {
         false
     }
+    /// Whether dry friction that reverses early passes for it.
+    fn late(&self) -> bool {
+        false
+    }
     /// Whether it rings with damping, as the loop of the robot's controller does.
     fn rings(&self, _shape: &Shape) -> bool {
         false

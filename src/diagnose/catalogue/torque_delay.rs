@@ -38,6 +38,10 @@ impl Effect for TorqueDelay {
         true
     }
 
+    fn late(&self) -> bool {
+        true
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         Some(Element::Delay {
             joints: e.place.actuators(cx.data.joints()),

@@ -162,6 +162,9 @@ pub struct Reversals {
     /// Least such time that counts in a log that does not look like a simulator's. Unit: s. Source: MuJoCo's default gives
     /// 9.5 ms; of the recordings of three machines one settles at 4.8 ms (the EMPS), the others at 0.
     pub early: f64,
+    /// Such a time of a simulator whose settings nobody has changed: tried where a delay is claimed. Unit: s. Source: MuJoCo's
+    /// default `solref`.
+    pub usual: f64,
     /// Part of the deceleration by dry friction alone by which a simulator's friction gives way, `(1 − d)/d`. Unit: share.
     /// Source: MuJoCo's default `solimp`, `d` = 0.9.
     pub soft: f64,
@@ -189,6 +192,7 @@ pub(super) const REVERSALS: Reversals = Reversals {
     shortest: 0.002,
     longest: 0.03,
     early: 0.006,
+    usual: 0.0095,
     soft: 1.0 / 9.0,
     settled: 5e-4,
     rounds: 5,
