@@ -52,7 +52,7 @@ macro_rules! documents {
             #[doc = "[simulators.md]: crate::documentation::simulators"]
             #[doc = "[withheld.md]: crate::documentation::withheld"]
             #[doc = ""]
-            #[doc = include_str!(concat!("../docs/", $file, ".md"))]
+            #[cfg_attr(any(doc, doctest), doc = include_str!(concat!("../docs/", $file, ".md")))]
             pub mod $name {}
         )*
     };

@@ -248,11 +248,14 @@ fn append(
         .into_par_iter()
         .map(|p| piece(p, delimiter, &dialect.cells, keep))
         .collect();
+    let columns = table.columns.par_iter_mut().enumerate();
+    columns.for_each(|(k, column)| {
+        for p in &pieces {
+            column.extend_from_slice(&p.columns[k]);
+        }
+    });
     let end = pieces.len().wrapping_sub(1);
     for (k, mut p) in pieces.into_iter().enumerate() {
-        for (column, more) in table.columns.iter_mut().zip(p.columns) {
-            column.extend_from_slice(&more);
-        }
         // a recording that was cut in the middle of its last line
         if cut_off && k == end && p.last {
             p.count -= 1;
@@ -341,6 +344,19 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
         let mut k = 0;
         let mut wrong = None;
         loop {
+            if k < n
+                && keep[k]
+                && cells[k] == Cell::Number
+                && let Some((x, end)) = number::plain(text, at, delimiter)
+            {
+                row[k] = x;
+                k += 1;
+                at = end + 1;
+                if text[end] == b'\n' {
+                    break;
+                }
+                continue;
+            }
             let start = at;
             while at < text.len() && text[at] != delimiter && text[at] != b'\n' {
                 at += 1;
