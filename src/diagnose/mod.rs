@@ -231,13 +231,13 @@ pub fn of_logs(
     let [refit, after] = [&[][..], &members].map(|set| evidence.torque_left(set));
     let mut findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
     let fitted = |r: &Series| r.fit;
-    let residual_gap = gap::joints(&data, &refit, fitted);
+    let residual_gap = gap::joints(data, &refit, fitted);
     progress("forward simulation");
     let all = decision.members.iter().map(|m| &m.candidate);
     let all = all.map(|c| (effects[c.effect].as_ref(), c.place, &c.shape, &c.eta[..]));
     let added = forward::effects_torque(&cx, all);
-    let held = controller::identify(&data, &evidence.phi);
-    let forward = forward::forward(&data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
+    let held = controller::identify(data, &evidence.phi);
+    let forward = forward::forward(data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
     let (improved, mut warnings) =
         improve::improve(&evidence, &cx, &effects, &phi_after, &findings, &frozen);
     let posterior = (settings.samples > 0).then(|| {
@@ -246,9 +246,9 @@ pub fn of_logs(
     });
     warnings.extend(payload::warnings(logs));
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
-    let at_rest = at_rest::find(&data, &units);
+    let at_rest = at_rest::find(data, &units);
     warnings.extend(at_rest::warnings(&at_rest));
-    let left = too_much(&residual_gap, &data);
+    let left = too_much(&residual_gap, data);
     let honest = match (decision.verdict, left) {
         (Verdict::NoGap, true) => Verdict::Unknown,
         (verdict, _) => verdict,
@@ -267,7 +267,7 @@ pub fn of_logs(
             }
         }
     };
-    let second_encoder = second_encoder::find(&data, &cx.phi)?;
+    let second_encoder = second_encoder::find(data, &cx.phi)?;
     let claims = findings.iter().filter(|f| f.is_claim());
     let claims: Vec<_> = claims.map(|f| (f.effect, f.joints.clone())).collect();
     warnings.extend(second_encoder::warnings(&second_encoder, &claims));
@@ -275,23 +275,23 @@ pub fn of_logs(
         progress("next experiment");
         next::propose(&evidence, &cx, &effects, &list, &findings, settings)
     });
-    let scaled = gap::scaled(&data, &refit);
+    let scaled = gap::scaled(data, &refit);
     Ok(Diagnosis {
         robot: plant.name().to_string(),
         joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
         units,
         verdict,
         findings,
-        frozen: gap::joints(&data, &frozen, fitted),
+        frozen: gap::joints(data, &frozen, fitted),
         refit: residual_gap,
-        explained: gap::joints(&data, &after, fitted),
-        shares: gap::shares(&data, &scaled),
+        explained: gap::joints(data, &after, fitted),
+        shares: gap::shares(data, &scaled),
         bound: match data.records.iter().any(|r| r.fit && r.cycle.is_some()) {
-            true => gap::bound(&data, &scaled),
+            true => gap::bound(data, &scaled),
             // tried on other periods, of which there are none
             false => None,
         },
-        records: result::record_gaps(&data, &phi_after, [&frozen, &refit, &after]),
+        records: result::record_gaps(data, &phi_after, [&frozen, &refit, &after]),
         holdout: data.predicts().then_some(decision.holdout),
         moves: data.moves(),
         at_rest,
@@ -302,10 +302,10 @@ pub fn of_logs(
         } else {
             1.0
         },
-        traces: traces::traces(&data, &refit, &after),
-        noise_source: result::noise_source(&data).into(),
-        untestable: result::untestable(&data, &list, &effects),
-        ruled_out: result::ruled_out(&data, &list, &effects),
+        traces: traces::traces(data, &refit, &after),
+        noise_source: result::noise_source(data).into(),
+        untestable: result::untestable(data, &list, &effects),
+        ruled_out: result::ruled_out(data, &list, &effects),
         phi: phi_after[..plant.parameters().len()].to_vec(),
         improved,
         posterior,
