@@ -12,7 +12,7 @@
 //! | loads | `payload` | what the robot carried: known, unknown or nothing |
 //! | nominal | `data`, `rigid`, [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
-//! | search | `search`, `settle`, `verdict` | sets of effects, rivals, confidence |
+//! | search | `search`, `settle`, `verdict`, `searched` | sets of effects, rivals, confidence |
 //! | constants | [`thresholds`] | what the verdict rests on, with units and origin |
 //! | intervals | `interval` | how sure the share is that an effect explains |
 //! | gap | `gap` | residuals against noise: joints, odd, even, non-periodic |
@@ -59,6 +59,7 @@ pub(crate) mod result;
 mod reversal;
 pub(crate) mod rigid;
 pub(crate) mod search;
+mod searched;
 #[doc(hidden)]
 pub mod second_encoder;
 pub(crate) mod settings;
@@ -84,12 +85,11 @@ use crate::error::{Error, Result};
 use crate::log::{self, Experiment, Purpose};
 use crate::plant::Plant;
 use crate::signals::series::Series;
-use catalogue::Context;
 use channel::Channel;
 use data::Data;
-use evidence::Evidence;
 use payload::Loads;
 use rayon::prelude::*;
+use searched::Searched;
 use std::borrow::Cow;
 
 #[doc(hidden)]
@@ -201,17 +201,19 @@ pub fn of_logs(
     closeness::tighten(&mut data, &effects)?;
     let first = Searched::of(&data, &effects, progress)?;
     // a delay and the time by which a simulator's friction reverses early are nearly the same
-    let early = first.may_be_early(&effects);
-    let early = early.then(|| {
-        let loads = carried.as_ref().map_or(Loads::One, |c| c.loads);
-        let mut early = prepare_with(plant, logs, loads, Some(T.reversals.usual))?;
-        closeness::tighten(&mut early, &effects)?;
-        Ok(early)
-    });
-    let early = early.transpose()?;
-    let second = early.as_ref();
-    let second = second.map(|data| Searched::of(data, &effects, progress));
-    let second = second.transpose()?;
+    let early = match first.may_be_early(&effects) {
+        true => {
+            let loads = carried.as_ref().map_or(Loads::One, |c| c.loads);
+            let mut early = prepare_with(plant, logs, loads, Some(T.reversals.usual))?;
+            closeness::tighten(&mut early, &effects)?;
+            Some(early)
+        }
+        false => None,
+    };
+    let second = match &early {
+        Some(data) => Some(Searched::of(data, &effects, progress)?),
+        None => None,
+    };
     let Searched {
         evidence,
         cx,
@@ -316,67 +318,6 @@ pub fn of_logs(
         closeness: data.closeness,
         window: data.window,
     })
-}
-
-/// What the search found in records.
-struct Searched<'a> {
-    evidence: Evidence<'a>,
-    cx: Context<'a>,
-    list: Vec<search::Candidate>,
-    decision: verdict::Decision,
-}
-
-impl<'a> Searched<'a> {
-    fn of(
-        data: &'a Data<'a>,
-        effects: &[Box<dyn catalogue::Effect>],
-        progress: &(dyn Fn(&str) + Sync),
-    ) -> Result<Self> {
-        let evidence = Evidence::new(data, 1.0);
-        let phi = evidence.parameters(&[], &evidence.fit(&[]));
-        let cx = Context::new(data, phi)?;
-        progress("every effect at every place");
-        let list = search::singles(&evidence, &cx, effects, &[]);
-        let (cx, list) = settle::settled(data, &evidence, effects, cx, list)?;
-        let decision = verdict::decide(&evidence, &cx, effects, &list, progress);
-        Ok(Searched {
-            evidence,
-            cx,
-            list,
-            decision,
-        })
-    }
-
-    /// Whether it claims an effect that dry friction that reverses early may pass for.
-    fn late(&self, effects: &[Box<dyn catalogue::Effect>]) -> bool {
-        let mut members = self.decision.members.iter();
-        members.any(|m| m.together >= T.confidence.claim && effects[m.candidate.effect].late())
-    }
-
-    /// Whether what it claims may be the early friction of a simulator with its usual settings, which was not taken for
-    /// found.
-    fn may_be_early(&self, effects: &[Box<dyn catalogue::Effect>]) -> bool {
-        let data = self.evidence.data;
-        data.may_lead() && data.lead != T.reversals.usual && self.late(effects)
-    }
-
-    /// `χ²` with the set that was found, and by how much less certain coefficients are than of independent samples.
-    fn left(&self) -> [f64; 2] {
-        let members = self.decision.projected();
-        let fit = self.evidence.fit(&members);
-        let residual = self.evidence.residual(&members, &fit);
-        let scale = verdict::inflation(&residual, self.evidence.data.fitted);
-        [self.evidence.j0 - fit.gain, scale]
-    }
-
-    /// Whether it explains the records without the effect that the other claims: as well as what that one leaves allows, or
-    /// all that counts, where the other took friction to reverse early, too.
-    fn stands_for(&self, other: &Searched, effects: &[Box<dyn catalogue::Effect>]) -> bool {
-        let ([own, _], [left, scale]) = (self.left(), other.left());
-        let as_well = own < left + (T.reversals.sure * scale).powi(2);
-        let all = matches!(self.decision.verdict, Verdict::NoGap | Verdict::Explained);
-        !self.late(effects) && (as_well || all && other.evidence.data.lead > 0.0)
-    }
 }
 
 /// Whether the refit leaves more on any joint than a sound model does, counted as the report counts it: `no_gap` is not

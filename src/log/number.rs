@@ -6,6 +6,47 @@ const POWERS: [f64; 23] = [
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
 
+/// Digits with or without a point among them.
+struct Decimal {
+    /// the digits as one number; wrong where there are more than 19
+    mantissa: u64,
+    /// how many there are
+    digits: usize,
+    /// how many of them stand behind the point
+    point: usize,
+    /// where they end
+    end: usize,
+}
+
+/// The digits that start at a place of a text.
+#[inline(always)]
+fn decimal(text: &[u8], start: usize) -> Decimal {
+    let mut mantissa: u64 = 0;
+    let mut digits_from = |mut i: usize| {
+        while i < text.len() && text[i].is_ascii_digit() {
+            mantissa = mantissa
+                .wrapping_mul(10)
+                .wrapping_add(u64::from(text[i] - b'0'));
+            i += 1;
+        }
+        i
+    };
+    let mut end = digits_from(start);
+    let (mut digits, mut point) = (end - start, 0);
+    if end < text.len() && text[end] == b'.' {
+        let from = end + 1;
+        end = digits_from(from);
+        point = end - from;
+        digits += point;
+    }
+    Decimal {
+        mantissa,
+        digits,
+        point,
+        end,
+    }
+}
+
 /// A cell of a table as a number; a dropped one (empty, `nan`, `null`, `inf`, `-`) is NaN, and what
 /// is no number at all is `None`.
 ///
@@ -27,28 +68,14 @@ pub fn parse(cell: &[u8]) -> Option<f64> {
         }
         _ => false,
     };
-    let mut mantissa: u64 = 0;
-    let start = i;
-    while i < n && cell[i].is_ascii_digit() {
-        mantissa = mantissa
-            .wrapping_mul(10)
-            .wrapping_add(u64::from(cell[i] - b'0'));
-        i += 1;
-    }
-    let mut digits = i - start;
-    let mut exponent = 0i32;
-    if i < n && cell[i] == b'.' {
-        i += 1;
-        let point = i;
-        while i < n && cell[i].is_ascii_digit() {
-            mantissa = mantissa
-                .wrapping_mul(10)
-                .wrapping_add(u64::from(cell[i] - b'0'));
-            i += 1;
-        }
-        digits += i - point;
-        exponent = -((i - point) as i32);
-    }
+    let Decimal {
+        mantissa,
+        digits,
+        point,
+        end,
+    } = decimal(cell, i);
+    i = end;
+    let mut exponent = -(point as i32);
     if digits == 0 || digits > 19 {
         return slow(cell);
     }
@@ -97,33 +124,20 @@ pub fn parse(cell: &[u8]) -> Option<f64> {
 /// [`parse`] of the cell.
 #[inline(always)]
 pub fn plain(text: &[u8], at: usize, delimiter: u8) -> Option<(f64, usize)> {
-    let mut i = at;
-    let negative = *text.get(i)? == b'-';
-    i += usize::from(negative);
-    let mut mantissa: u64 = 0;
-    let mut digits_from = |mut i: usize| loop {
-        let digit = text.get(i)?.wrapping_sub(b'0');
-        if digit > 9 {
-            return Some(i);
-        }
-        mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
-        i += 1;
-    };
-    let start = i;
-    i = digits_from(i)?;
-    let (mut digits, mut point) = (i - start, 0);
-    if text[i] == b'.' {
-        let from = i + 1;
-        i = digits_from(from)?;
-        point = i - from;
-        digits += point;
-    }
-    let ends = text[i] == delimiter || text[i] == b'\n';
+    let negative = *text.get(at)? == b'-';
+    let Decimal {
+        mantissa,
+        digits,
+        point,
+        end,
+    } = decimal(text, at + usize::from(negative));
+    let next = *text.get(end)?;
+    let ends = next == delimiter || next == b'\n';
     if !ends || digits == 0 || digits > 19 || mantissa >= 1 << 53 {
         return None;
     }
     let x = mantissa as f64 / POWERS[point];
-    Some((if negative { -x } else { x }, i))
+    Some((if negative { -x } else { x }, end))
 }
 
 /// Everything that is not a plain short decimal.

@@ -1,0 +1,85 @@
+//! What the search found in records, and whether another search of the same records stands for it.
+//!
+//! A delay of the torque and the time by which a simulator's dry friction reverses early are nearly the same, and a large effect
+//! moves both. So where a delay is claimed, the records are searched once more with the time of a simulator's usual settings.
+
+use super::catalogue::{Context, Effect};
+use super::data::Data;
+use super::evidence::Evidence;
+use super::search::{Candidate, singles};
+use super::settle::settled;
+use super::thresholds::THRESHOLDS as T;
+use super::verdict::{Decision, Verdict, decide, inflation};
+use crate::error::Result;
+
+/// What the search found in records.
+pub struct Searched<'a> {
+    /// the nominal model
+    pub evidence: Evidence<'a>,
+    /// what columns are made from
+    pub cx: Context<'a>,
+    /// all effects at all places
+    pub list: Vec<Candidate>,
+    /// those that are there
+    pub decision: Decision,
+}
+
+impl<'a> Searched<'a> {
+    /// Searches records.
+    ///
+    /// # Errors
+    /// Poses that cannot be reached.
+    pub fn of(
+        data: &'a Data<'a>,
+        effects: &[Box<dyn Effect>],
+        progress: &(dyn Fn(&str) + Sync),
+    ) -> Result<Self> {
+        let evidence = Evidence::new(data, 1.0);
+        let phi = evidence.parameters(&[], &evidence.fit(&[]));
+        let cx = Context::new(data, phi)?;
+        progress("every effect at every place");
+        let list = singles(&evidence, &cx, effects, &[]);
+        let (cx, list) = settled(data, &evidence, effects, cx, list)?;
+        let decision = decide(&evidence, &cx, effects, &list, progress);
+        Ok(Searched {
+            evidence,
+            cx,
+            list,
+            decision,
+        })
+    }
+
+    /// Whether what it claims may be the early friction of a simulator with its usual settings, which was not taken for
+    /// found.
+    pub fn may_be_early(&self, effects: &[Box<dyn Effect>]) -> bool {
+        let data = self.evidence.data;
+        data.may_lead() && data.lead != T.reversals.usual && self.late(effects)
+    }
+
+    /// Whether it explains the records without the effect that the other claims: as well as what that one leaves allows, or
+    /// all that counts, where the other took friction to reverse early, too.
+    pub fn stands_for(&self, other: &Searched, effects: &[Box<dyn Effect>]) -> bool {
+        let all = matches!(self.decision.verdict, Verdict::NoGap | Verdict::Explained);
+        let as_well = || self.left() < other.left() + other.margin();
+        !self.late(effects) && (all && other.evidence.data.lead > 0.0 || as_well())
+    }
+
+    /// Whether it claims an effect that dry friction that reverses early may pass for.
+    fn late(&self, effects: &[Box<dyn Effect>]) -> bool {
+        let mut members = self.decision.members.iter();
+        members.any(|m| m.together >= T.confidence.claim && effects[m.candidate.effect].late())
+    }
+
+    /// `χ²` with the set that was found.
+    fn left(&self) -> f64 {
+        self.evidence.j0 - self.evidence.fit(&self.decision.projected()).gain
+    }
+
+    /// By how much another `χ²` may be higher and count as no worse: deviations squared of what the set leaves.
+    fn margin(&self) -> f64 {
+        let members = self.decision.projected();
+        let residual = (self.evidence).residual(&members, &self.evidence.fit(&members));
+        let scale = inflation(&residual, self.evidence.data.fitted);
+        (T.reversals.sure * scale).powi(2)
+    }
+}
