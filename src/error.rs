@@ -6,6 +6,12 @@
 
 use std::path::{Path, PathBuf};
 
+/// `1 gap`, `3 gaps`.
+pub(crate) fn counted(n: usize, noun: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {noun}{plural}")
+}
+
 /// Number, from 1, of the line of a text in which a byte stands.
 pub(crate) fn line_of(text: &str, at: usize) -> usize {
     1 + text.bytes().take(at).filter(|b| *b == b'\n').count()
@@ -206,6 +212,8 @@ warning_kinds! {
     DriveGainApplied = "drive_gain_applied",
     /// No known load tells the drive gains; the load is as good as they are.
     DriveGainAssumed = "drive_gain_assumed",
+    /// Two methods give a load whose intervals do not meet.
+    MethodsDisagree = "methods_disagree",
     /// An effort limit cut a simulated torque.
     TorqueSaturated = "torque_saturated",
     /// Simulated friction did not settle within a step.

@@ -144,6 +144,11 @@ fn load(spec: &str, identify: Option<&[String]>) -> Result<Plant> {
 /// # Errors
 /// A name that there is not.
 pub fn terms(names: &[String]) -> Result<Vec<JointTerm>> {
+    if names.len() > 1 && names.iter().any(|n| n == "none") {
+        return Err(Error::Argument(
+            "--identify is either none or a list of columns, not both".into(),
+        ));
+    }
     let mut terms = Vec::new();
     for name in names.iter().filter(|n| n.as_str() != "none") {
         match JointTerm::ALL.into_iter().find(|t| t.name() == name) {

@@ -2,7 +2,6 @@
 
 use super::{pretty, print, warn, write};
 use clap::ValueEnum;
-use excite::log::parts::Purpose;
 use excite::plant::Plant;
 use excite::report::format::unit_of;
 use excite::simulate::effects::parse_payload;
@@ -204,6 +203,8 @@ pub fn run(args: Args) -> Result<()> {
     let mut warnings = plant.warnings().to_vec();
     warnings.extend(more);
     let periods = args.periods.unwrap_or(trajectory.periods);
+    let list = |path: &PathBuf| experiment(path, &args, trajectory.fourier.period, periods);
+    let listed = args.experiment.as_ref().map(list).transpose()?;
     let bar = std::io::stderr().is_terminal().then(|| {
         let bar = indicatif::ProgressBar::new(1000);
         bar.set_style(
@@ -237,8 +238,8 @@ pub fn run(args: Args) -> Result<()> {
     };
     write_log(&args.output, args.force, &plant, &run, &measured, columns)?;
     let mut out = summary(&plant, &run, &args, periods, trajectory.fourier.period);
-    if let Some(path) = &args.experiment {
-        experiment(path, &args, trajectory.fourier.period, periods)?;
+    if let (Some(path), Some(text)) = (&args.experiment, &listed) {
+        write(path, true, text)?;
         let _ = writeln!(out, "wrote {}", path.display());
     }
     if let Some(n) = args.monte_carlo {
@@ -331,8 +332,11 @@ fn summary(plant: &Plant, run: &Run, args: &Args, periods: u32, period: f64) -> 
     out
 }
 
-/// Writes the experiment, or one more record of it.
-fn experiment(path: &Path, args: &Args, period: f64, periods: u32) -> Result<()> {
+/// The experiment with the record of this run: a new text, or the one that stands there with one more record.
+///
+/// # Errors
+/// A file that cannot be read or is of another robot, or has this log with another use, period or payload.
+fn experiment(path: &Path, args: &Args, period: f64, periods: u32) -> Result<String> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
@@ -349,41 +353,69 @@ fn experiment(path: &Path, args: &Args, period: f64, periods: u32) -> Result<()>
         true => relative(Path::new(&args.robot)),
         false => args.robot.clone(),
     };
+    let log = relative(&args.output);
+    let mut record = toml::Table::new();
+    let mut set = |key: &str, value: toml::Value| record.insert(key.into(), value);
+    set("log", log.clone().into());
+    set(
+        "use",
+        match args.purpose {
+            Use::Fit => "fit".into(),
+            Use::Holdout => "holdout".into(),
+        },
+    );
+    if periods > 1 {
+        set("period", period.into());
+    }
+    if args.payload.is_some() {
+        set("payload", "unknown".into());
+    }
     let quoted = |text: &str| toml::Value::String(text.into()).to_string();
-    let first = format!("robot = {}\n", quoted(&robot));
     let mut text = match std::fs::read_to_string(path) {
-        Ok(old) if !old.contains(&first) => {
-            return Err(Error::file(
-                path,
-                "",
-                format!("is of another robot than {robot}; choose another --experiment"),
-            ));
-        }
         Ok(old) => old,
-        Err(_) => first,
-    };
-    let purpose = match args.purpose {
-        Use::Fit => Purpose::Fit,
-        Use::Holdout => Purpose::Holdout,
-    };
-    let log = quoted(&relative(&args.output));
-    if !text.contains(&format!("log = {log}\n")) {
-        let _ = write!(
-            text,
-            "\n[[record]]\nlog = {log}\nuse = \"{}\"\n",
-            match purpose {
-                Purpose::Fit => "fit",
-                Purpose::Holdout => "holdout",
-            }
-        );
-        if periods > 1 {
-            let _ = writeln!(text, "period = {period}");
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            format!("robot = {}\n", quoted(&robot))
         }
-        if args.payload.is_some() {
-            text.push_str("payload = \"unknown\"\n");
+        Err(e) => return Err(Error::io(path, e)),
+    };
+    let whole: toml::Table = text
+        .parse()
+        .map_err(|e: toml::de::Error| Error::file(path, "", e.message()))?;
+    if whole.get("robot").and_then(toml::Value::as_str) != Some(&robot) {
+        let message = format!("is of another robot than {robot}; choose another --experiment");
+        return Err(Error::file(path, "", message));
+    }
+    let records = whole.get("record").and_then(toml::Value::as_array);
+    let mut records = records.into_iter().flatten().filter_map(|r| r.as_table());
+    match records.find(|r| r.get("log").and_then(toml::Value::as_str) == Some(&log)) {
+        Some(old) => {
+            let value = |of: &toml::Table, key: &str| {
+                let value = of.get(key)?.clone();
+                // 5 is 5.0
+                Some(value.as_integer().map_or(value, |x| (x as f64).into()))
+            };
+            let differs = |key: &&&str| value(old, key) != value(&record, key);
+            if let Some(key) = ["use", "period", "payload"].iter().find(differs) {
+                let shown = |r: &toml::Table| r.get(*key).map_or("none".into(), |v| v.to_string());
+                let message = format!(
+                    "has a record of {log} whose {key} is {}, not {}: remove that record, or choose another --output or \
+                     --experiment",
+                    shown(old),
+                    shown(&record)
+                );
+                return Err(Error::file(path, "", message));
+            }
+        }
+        None => {
+            text.push_str("\n[[record]]\n");
+            for key in ["log", "use", "period", "payload"] {
+                if let Some(value) = record.get(key) {
+                    let _ = writeln!(text, "{key} = {value}");
+                }
+            }
         }
     }
-    write(path, true, &text)
+    Ok(text)
 }
 
 /// The table that is printed.

@@ -190,23 +190,30 @@ fn excitation(a: &Assessment, e: &Excitation) -> String {
         }
     }
     if let Some(p) = e.predictions.first() {
-        let (good, _) = e.known(10.0);
+        let (good, judged) = e.known(10.0);
         let worst = match p.percent {
             Some(x) => format!("{x:.1} %"),
             None => format!("{:.2e} {} about 0", p.std, p.unit),
         };
         let _ = writeln!(
             out,
-            "predicted: {good} of {} base parameters to 10 % or better\n           worst {}: {worst}",
-            e.predictions.len(),
+            "predicted: {good} of {judged} base parameters{} to 10 % or better\n           worst {}: {worst}",
+            match judged == e.predictions.len() {
+                true => "",
+                false => " that are not 0",
+            },
             p.parameter
         );
-        let _ = writeln!(
-            out,
-            "torque elsewhere: uncertain by {:.1} % of its size, at {} random states",
-            100.0 * e.elsewhere.relative(torque_noise).min(1e298),
-            e.elsewhere.states
-        );
+        let relative = e.elsewhere.relative(torque_noise);
+        // a model without bodies has no torque to compare with
+        if relative < 1e6 {
+            let _ = writeln!(
+                out,
+                "torque elsewhere: uncertain by {:.1} % of its size, at {} random states",
+                100.0 * relative,
+                e.elsewhere.states
+            );
+        }
     }
     out
 }

@@ -52,13 +52,21 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
     };
     let held = d.shrink().map(|gone| 1.0 - gone);
     // what stays where nothing was fitted is said where it is clearly more
+    let more = d.findings.iter().filter(|f| f.member && !f.is_claim());
+    // what is too unsure to be claimed takes its part, too
+    let them = if claims.len() == 1 { "it" } else { "them" };
+    let with = match (more.count(), claims.is_empty()) {
+        (0, _) | (_, true) => String::new(),
+        (1, _) => format!("With {them} and one less sure effect of the table, "),
+        _ => format!("With {them} and the less sure effects of the table, "),
+    };
     let left = match held.filter(|h| *h > d.unexplained + 0.1) {
         Some(held) => format!(
-            "{} of the gap stays, on records held out {}",
-            percent(d.unexplained),
-            percent(held.min(1.0))
+            "{with}{} of the gap stays on records held out, {} on those that were fitted",
+            percent(held.min(1.0)),
+            percent(d.unexplained)
         ),
-        None => format!("{} of the gap stays", percent(d.unexplained)),
+        None => format!("{with}{} of the gap stays", percent(d.unexplained)),
     };
     match d.verdict {
         Verdict::NoGap => (
@@ -76,7 +84,7 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         Verdict::PartlyExplained => (
             Tone::Fair,
             format!(
-                "{}: {}. Something remains: {left}.",
+                "{}: {}. {left}.",
                 if sure {
                     "Partly explained"
                 } else {

@@ -5,6 +5,7 @@ use super::{
     Format, Model, Part, base_name, escape, named_moments, possible, remark, rpy, xml_comment,
 };
 use crate::error::Result;
+use crate::robot::urdf::NO_LIMIT;
 use crate::robot::{JointTerm, Motion, Robot};
 use std::fmt::Write;
 
@@ -98,21 +99,24 @@ fn tree(robot: &Robot) -> String {
             body.axis.y,
             body.axis.z
         );
-        let mut limit = String::new();
-        if bounded {
-            let _ = write!(
-                limit,
-                " lower=\"{}\" upper=\"{}\"",
-                limits.position[0], limits.position[1]
-            );
-        }
-        for (name, x) in [("velocity", limits.velocity), ("effort", limits.effort)] {
-            if x.is_finite() {
-                let _ = write!(limit, " {name}=\"{x}\"");
+        let [lower, upper] = limits.position;
+        let others = [limits.velocity, limits.effort];
+        // readers want velocity and effort in each <limit>, and take an end that is missing for 0
+        let turns = kind == "continuous";
+        if !turns || others.iter().any(|x| x.is_finite()) {
+            let all = [("lower", lower), ("upper", upper)];
+            let ends = if turns { &[][..] } else { &all };
+            let rest = [("velocity", others[0]), ("effort", others[1])];
+            let mut limit = String::new();
+            for (name, x) in ends.iter().chain(&rest) {
+                let _ = write!(limit, " {name}=\"{}\"", x.clamp(-NO_LIMIT, NO_LIMIT));
             }
-        }
-        if !limit.is_empty() {
-            let _ = writeln!(out, "    <limit{limit}/>");
+            let none = ends.iter().chain(&rest).any(|(_, x)| x.is_infinite());
+            let note = match none {
+                true => format!("   <!-- {NO_LIMIT} stands for none -->"),
+                false => String::new(),
+            };
+            let _ = writeln!(out, "    <limit{limit}/>{note}");
         }
         // the element has no ends of its own: they are those of <limit>
         if let Some(v) = limits

@@ -107,6 +107,11 @@ fn only(columns: &[[usize; 2]], actuator: usize) -> Vec<[usize; 2]> {
 }
 
 impl Factor {
+    /// Whether it holds the numbers of another.
+    pub(super) fn same(&self, other: &Factor) -> bool {
+        self.together.ncols() > 0 && self.together == other.together && self.alone == other.alone
+    }
+
     /// Both together, as parts of one log: the first one's name stands for both. Of a warning that both have in other
     /// words the first one's are kept, which then says so.
     ///

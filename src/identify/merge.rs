@@ -11,7 +11,7 @@ use super::stack::Stack;
 use super::validation::{Errors, JointError};
 use super::{doubts, standard, weights};
 use crate::base::BaseParameters;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::Robot;
 use faer::Mat;
@@ -63,6 +63,22 @@ pub struct Merged {
     pub warnings: Vec<Warning>,
 }
 
+/// That factors hold the same numbers.
+fn twice(factors: &[Factor]) -> Option<Warning> {
+    let (k, l) = (0..factors.len())
+        .flat_map(|l| (0..l).map(move |k| (k, l)))
+        .find(|&(k, l)| factors[k].same(&factors[l]))?;
+    Some(Warning::new(
+        WarningKind::LogSuspect,
+        "factors",
+        format!(
+            "number {} and number {} hold the same numbers: a record that counts twice makes every ± too small",
+            k + 1,
+            l + 1
+        ),
+    ))
+}
+
 /// Identifies a plant from condensed records.
 ///
 /// # Errors
@@ -75,6 +91,7 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
                 .into(),
         ));
     }
+    let twice = twice(&factors);
     let mut all = factors.into_iter();
     let first = all.next().ok_or_else(|| {
         Error::Argument("no factor is named; make some with `excite condense`".into())
@@ -93,6 +110,7 @@ pub fn merge(plant: &Plant, factors: Vec<Factor>, settings: &Settings) -> Result
     let mut warnings = plant.warnings().to_vec();
     warnings.extend(base.warnings.iter().cloned());
     warnings.extend(header.warnings.iter().cloned());
+    warnings.extend(twice);
     let part = &header.parts[0];
     let fitted = factor.fitted();
     let rows: f64 = part.used.iter().sum();

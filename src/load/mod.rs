@@ -62,6 +62,7 @@ pub(crate) use two_step::TwoStep;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Experiment, Payload};
 use crate::plant::Plant;
+use crate::report::format::significant;
 
 /// Identifies the load of the records whose payload is `"unknown"`. Records with `payload = "none"`
 /// identify the empty robot; records with a known load identify the drive gains.
@@ -140,7 +141,13 @@ pub fn from_records(
         )),
     }
     warnings.extend(one_step.warnings.iter().cloned());
+    warnings.extend(unexplained(plant, &one_step));
     let (two_step, no_two_step) = published(plant, tool, &records, settings)?;
+    warnings.extend(
+        two_step
+            .as_ref()
+            .and_then(|t| apart(&one_step.load, &t.load)),
+    );
     Ok(Identified {
         robot: plant.name().into(),
         joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
@@ -152,6 +159,67 @@ pub fn from_records(
         method: settings.method,
         flange: settings.flange,
         warnings,
+    })
+}
+
+/// Share of a drive's torque that may be left in the loaded records without a word: all of it.
+const MUCH: f64 = 1.0;
+
+/// The drive of which most is left, where that is much.
+fn unexplained(plant: &Plant, found: &one_step::OneStep) -> Option<Warning> {
+    let suspect = |w: &Warning| w.kind == WarningKind::LogSuspect;
+    if found.warnings.iter().any(suspect) {
+        return None;
+    }
+    let loaded = found.records.iter().filter(|r| r.loaded);
+    let left = loaded.flat_map(|r| r.residuals.iter().enumerate());
+    let (j, worst) = left.max_by(|a, b| a.1.relative.total_cmp(&b.1.relative))?;
+    (worst.relative > MUCH).then(|| {
+        Warning::new(
+            WarningKind::LogSuspect,
+            plant.actuators()[j].name.clone(),
+            format!(
+                "{:.0} % of its torque is left by the load, the robot and any friction: its column, unit or gain may not be \
+                 what is stated, and the load is no better than that",
+                100.0 * worst.relative
+            ),
+        )
+    })
+}
+
+/// That two methods give loads whose intervals do not meet.
+fn apart(one: &LoadBody, two: &LoadBody) -> Option<Warning> {
+    const WHAT: [(&str, &str, f64); 4] = [
+        ("mass", "kg", 1.0),
+        ("x of the centre", "mm", 1e3),
+        ("y of the centre", "mm", 1e3),
+        ("z of the centre", "mm", 1e3),
+    ];
+    let ([a, b], [s, t]) = (
+        [one, two].map(LoadBody::values),
+        [one, two].map(LoadBody::stds),
+    );
+    let apart: Vec<String> = (0..4)
+        .filter(|&i| (a[i] - b[i]).abs() > 1.96 * (s[i] + t[i]))
+        .map(|i| {
+            let (name, unit, size) = WHAT[i];
+            let value = |x: f64, s: f64| {
+                let (x, s) = (significant(size * x, 4), significant(1.96 * size * s, 2));
+                format!("{x} ± {s} {unit}")
+            };
+            format!("{name} {} and {}", value(a[i], s[i]), value(b[i], t[i]))
+        })
+        .collect();
+    (!apart.is_empty()).then(|| {
+        Warning::new(
+            WarningKind::MethodsDisagree,
+            "load",
+            format!(
+                "one step and two steps are farther apart than both their ±: {}; one of them, or both, cannot be right: \
+                 the two steps fit friction without a Stribeck term",
+                apart.join(", ")
+            ),
+        )
     })
 }
 

@@ -4,79 +4,98 @@ use crate::error::{Warning, WarningKind};
 use crate::median::median;
 use crate::robot::{Joint, Motion};
 use std::f64::consts::PI;
+use std::ops::Range;
 
-/// Runs of equal neighbours: first index and length.
-fn runs(y: &[f64]) -> impl Iterator<Item = (usize, usize)> + '_ {
+/// Runs of equal neighbours.
+fn runs(y: &[f64]) -> impl Iterator<Item = Range<usize>> + '_ {
     let mut start = 0;
     std::iter::from_fn(move || {
         if start >= y.len() {
             return None;
         }
         let length = y[start..].iter().take_while(|x| **x == y[start]).count();
-        let run = (start, length.max(1));
-        start += run.1;
+        let run = start..start + length.max(1);
+        start = run.end;
         Some(run)
     })
 }
 
-/// Marks the samples of a torque channel that stand at its largest or smallest value for long, as
-/// clipping makes them, and returns their number and that value.
+/// A torque channel that is clipped.
+pub struct Clipped {
+    /// where it stands there
+    pub at: Vec<Range<usize>>,
+    /// samples at the level where it stands more often
+    pub count: usize,
+    /// that level
+    pub level: f64,
+}
+
+/// Smallest and largest of the finite values; `[inf, -inf]` where there is none.
+fn extremes(y: &[f64]) -> [f64; 2] {
+    y.iter()
+        .filter(|x| x.is_finite())
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
+            [a.min(x), b.max(x)]
+        })
+}
+
+/// The samples of a torque channel that stand at its largest or smallest value for long, as clipping makes them.
 ///
 /// A channel that is merely coarse also dwells at its extremes, but no longer than elsewhere: what
 /// counts are runs of at least five samples, four times as long as usual in this channel, that
 /// make up at least 0.1 % of the record; or any such run at the effort limit.
-pub fn saturated(y: &[f64], effort: f64, valid: &mut [bool]) -> Option<(usize, f64)> {
-    let (low, high) = y
-        .iter()
-        .filter(|x| x.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
-            (a.min(x), b.max(x))
-        });
-    if high.is_nan() || high <= low {
+pub fn saturated(y: &[f64], effort: f64) -> Option<Clipped> {
+    let [low, high] = extremes(y);
+    if high <= low || !(high - low).is_finite() {
         return None;
     }
-    let usual = median(runs(y).map(|r| r.1 as f64));
-    let mut worst = None;
+    // found only where a run is long enough: few channels have one
+    let mut usual = None;
+    let mut worst: Option<Clipped> = None;
     for level in [high, low] {
         let near = |x: f64| (x - level).abs() <= 1e-9 * (high - low);
         // a run at the level, and not only of equal values, so that rounding does not hide it
         let mut found = Vec::new();
         let mut i = 0;
         while i < y.len() {
+            if !near(y[i]) {
+                i += 1;
+                continue;
+            }
             let length = y[i..].iter().take_while(|x| near(**x)).count();
-            if length >= 5 && length as f64 >= 4.0 * usual {
-                found.push((i, length));
+            if length >= 5 {
+                let usual = *usual.get_or_insert_with(|| median(runs(y).map(|r| r.len() as f64)));
+                if length as f64 >= 4.0 * usual {
+                    found.push(i..i + length);
+                }
             }
-            i += length.max(1);
+            i += length;
         }
-        let total: usize = found.iter().map(|r| r.1).sum();
-        let at_limit = level.abs() >= 0.98 * effort && total > 0;
+        let count: usize = found.iter().map(Range::len).sum();
+        let at_limit = level.abs() >= 0.98 * effort && count > 0;
         // a channel that rests at its extreme throughout is constant, not clipped
-        if (total as f64 >= 1e-3 * y.len() as f64 && total * 2 < y.len()) || at_limit {
-            for (start, length) in found {
-                valid[start..start + length].fill(false);
+        if (count as f64 >= 1e-3 * y.len() as f64 && count * 2 < y.len()) || at_limit {
+            let clipped = worst.get_or_insert(Clipped {
+                at: Vec::new(),
+                count,
+                level,
+            });
+            if count > clipped.count {
+                (clipped.count, clipped.level) = (count, level);
             }
-            if worst.is_none_or(|(n, _)| total > n) {
-                worst = Some((total, level));
-            }
+            clipped.at.extend(found);
         }
     }
     worst
 }
 
 /// Runs of equal values longer than a tenth of a second while `moving` says that the joint moves
-/// (at at least half of the run). Marks them and returns their number, samples and first index.
-pub fn stuck(
-    y: &[f64],
-    step: f64,
-    moving: &[bool],
-    valid: &mut [bool],
-) -> Option<(usize, usize, usize)> {
-    let awake = |range: std::ops::Range<usize>| {
+/// (at at least half of the run).
+pub fn stuck(y: &[f64], step: f64, moving: &[bool]) -> Vec<Range<usize>> {
+    stuck_where(y, step, |range| {
         let length = range.len();
         2 * moving[range].iter().filter(|m| **m).count() >= length
-    };
-    stuck_where(y, step, awake, valid)
+    })
 }
 
 /// Part of its whole range that a command must travel while an encoder stands still, for the
@@ -84,43 +103,20 @@ pub fn stuck(
 const TRAVEL: f64 = 0.02;
 
 /// Runs of equal values of an encoder longer than a tenth of a second while the command goes on.
-/// Marks them and returns their number, samples and first index.
-pub fn stuck_encoder(
-    y: &[f64],
-    command: &[f64],
-    step: f64,
-    valid: &mut [bool],
-) -> Option<(usize, usize, usize)> {
+pub fn stuck_encoder(y: &[f64], command: &[f64], step: f64) -> Vec<Range<usize>> {
     let extent = |y: &[f64]| {
-        let (low, high) = y
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
-                (a.min(x), b.max(x))
-            });
+        let [low, high] = extremes(y);
         high - low
     };
     let enough = TRAVEL * extent(command);
-    let went_on = |range: std::ops::Range<usize>| extent(&command[range]) > enough;
-    stuck_where(y, step, went_on, valid)
+    stuck_where(y, step, |range| extent(&command[range]) > enough)
 }
 
-fn stuck_where(
-    y: &[f64],
-    step: f64,
-    counts: impl Fn(std::ops::Range<usize>) -> bool,
-    valid: &mut [bool],
-) -> Option<(usize, usize, usize)> {
+fn stuck_where(y: &[f64], step: f64, counts: impl Fn(Range<usize>) -> bool) -> Vec<Range<usize>> {
     let least = ((0.1 / step).ceil() as usize).max(20);
-    let mut found: Option<(usize, usize, usize)> = None;
-    for (start, length) in runs(y) {
-        let range = start..start + length;
-        if length >= least && counts(range.clone()) {
-            valid[range].fill(false);
-            let (n, samples, first) = found.unwrap_or((0, 0, start));
-            found = Some((n + 1, samples + length, first));
-        }
-    }
-    found
+    runs(y)
+        .filter(|run| run.len() >= least && counts(run.clone()))
+        .collect()
 }
 
 /// Whether a position channel moves, sample by sample, from how far it is from a quarter of a
@@ -132,23 +128,14 @@ pub fn moving(y: &[f64], step: f64) -> Vec<bool> {
         let (a, b) = (i.saturating_sub(k), i.saturating_add(k).min(n - 1));
         (y[b] - y[a]).abs()
     };
-    let (low, high) = y
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
-            (a.min(x), b.max(x))
-        });
+    let [low, high] = extremes(y);
     let enough = 1e-4 * (high - low);
     (0..n).map(|i| high > low && far(i) > enough).collect()
 }
 
 /// What the range of a joint's positions says about their unit, if anything.
 pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
-    let (low, high) = q
-        .iter()
-        .filter(|x| x.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
-            (a.min(x), b.max(x))
-        });
+    let [low, high] = extremes(q);
     let limits = joint.limits.position;
     let span = limits[1] - limits[0];
     let fits = |scale: f64| {
@@ -167,9 +154,11 @@ pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
         ))
     };
     let revolute = joint.motion == Motion::Revolute;
-    let geared = joint
-        .gear_ratio
-        .is_some_and(|gear| gear.abs() > 1.5 && bounded && (fits(1.0 / gear) || fits(-1.0 / gear)));
+    // a motor turns the gear's ratio times as far: far beyond the limits, and not a little
+    let far = high - low > 1.5 * span;
+    let geared = joint.gear_ratio.is_some_and(|gear| {
+        gear.abs() > 1.5 && bounded && far && (fits(1.0 / gear) || fits(-1.0 / gear))
+    });
     let degrees =
         revolute && high.abs().max(low.abs()) > 2.0 * PI && (fits(PI / 180.0) || !bounded);
     match (degrees, geared) {

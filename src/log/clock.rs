@@ -11,7 +11,7 @@
 //! | a jump ahead by far more than the log is long | the later stamps are moved back, so that a gap of ten steps is left |
 //! | a gap | interpolated over so that filters run through, but marked as not measured |
 
-use crate::error::{Warning, WarningKind};
+use crate::error::{Warning, WarningKind, counted};
 use crate::median::median;
 
 /// Stamps after repair.
@@ -142,9 +142,9 @@ fn missing(gaps: &[[f64; 2]], step: f64, subject: &str) -> Option<Warning> {
     let longest = gaps.iter().map(|g| g[1] - g[0]).reduce(f64::max)?;
     let missing: f64 = gaps.iter().map(|g| (g[1] - g[0]) / step - 1.0).sum();
     let message = format!(
-        "{} gaps in the time, about {missing:.0} samples missing, the longest {longest:.4} s; they \
-         are interpolated for the filters and left out of the fit",
-        gaps.len()
+        "{} in the time, about {} missing, the longest {longest:.4} s; interpolated for the filters and left out of the fit",
+        counted(gaps.len(), "gap"),
+        counted(missing.round() as usize, "sample")
     );
     Some(Warning::new(WarningKind::TimeGaps, subject, message))
 }

@@ -79,6 +79,8 @@ pub(crate) struct Layout {
     pub without: Vec<String>,
     /// whether torques are currents whose gain nobody states
     pub currents: bool,
+    /// whether torques are currents times gains that are stated
+    pub gains: bool,
     pub warnings: Vec<Warning>,
 }
 

@@ -59,17 +59,15 @@ pub(crate) fn merge(parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
                 return Err(Error::file(&path, "", message));
             }
         };
+        if on.as_ref().is_some_and(|(ta, tb, _)| common(ta, tb) < 2) {
+            let message = "its stamps have less than two in common with those of the first file";
+            return Err(Error::file(&path, "", message));
+        }
         for k in 0..more.names.len() {
             let column = std::mem::take(&mut more.columns[k]);
             let values = match &on {
                 Some((_, _, at)) if *at == k => continue,
-                Some((ta, tb, _)) if ta != tb => onto(ta, tb, &column).ok_or_else(|| {
-                    Error::file(
-                        &path,
-                        "",
-                        "its stamps have less than two in common with those of the first file",
-                    )
-                })?,
+                Some((ta, tb, _)) if ta != tb => onto(ta, tb, &column),
                 _ => column,
             };
             let name = &more.names[k];
@@ -84,34 +82,44 @@ pub(crate) fn merge(parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
     Ok((table, format))
 }
 
-/// A channel on other stamps; NaN outside of its own.
-fn onto(to: &[f64], t: &[f64], y: &[f64]) -> Option<Vec<f64>> {
+/// Whether a stamp can be one.
+fn sound(t: f64) -> bool {
+    t.is_finite() && t.abs() < 1e21
+}
+
+/// How many stamps of the one lie within those of the other.
+fn common(to: &[f64], t: &[f64]) -> usize {
+    let t = t.iter().copied().filter(|t| sound(*t));
+    let (begin, end) = t.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| {
+        (a.min(t), b.max(t))
+    });
+    to.iter().filter(|x| (begin..=end).contains(*x)).count()
+}
+
+/// A channel on other stamps; NaN outside of its own, and where it has no two values.
+fn onto(to: &[f64], t: &[f64], y: &[f64]) -> Vec<f64> {
+    let mut out = vec![f64::NAN; to.len()];
     let mut last = f64::NEG_INFINITY;
-    let good: Vec<usize> = (0..t.len())
-        .filter(|&i| {
-            let ok = t[i].is_finite() && t[i].abs() < 1e21 && t[i] > last && y[i].is_finite();
-            last = if ok { t[i] } else { last };
-            ok
-        })
-        .collect();
-    if good.len() < 2 {
-        return None;
+    let (mut times, mut values) = (Vec::new(), Vec::new());
+    for (&t, &y) in t.iter().zip(y) {
+        if sound(t) && t > last && y.is_finite() {
+            last = t;
+            times.push(t);
+            values.push(y);
+        }
     }
-    let times: Vec<f64> = good.iter().map(|&i| t[i]).collect();
-    let values: Vec<f64> = good.iter().map(|&i| y[i]).collect();
-    let (begin, end) = (times[0], times[times.len() - 1]);
+    let (Some(&begin), true) = (times.first(), times.len() > 1) else {
+        return out;
+    };
     // walked once: the stamps must increase, those that do not stay without a value
     let mut order: Vec<usize> = (0..to.len()).filter(|&i| to[i].is_finite()).collect();
     order.sort_by(|a, b| to[*a].total_cmp(&to[*b]));
     let sorted: Vec<f64> = order.iter().map(|&i| to[i]).collect();
     let moved = interpolate(&times, &values, &sorted, Order::Linear);
-    let mut out = vec![f64::NAN; to.len()];
-    let mut any = 0;
     for (k, &i) in order.iter().enumerate() {
-        if (begin..=end).contains(&sorted[k]) {
+        if (begin..=last).contains(&sorted[k]) {
             out[i] = moved[k];
-            any += 1;
         }
     }
-    (any > 1).then_some(out)
+    out
 }

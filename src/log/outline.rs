@@ -5,7 +5,7 @@ use super::layout::Layout;
 use super::record::Reading;
 use super::{Experiment, Payload, Purpose, Record};
 use super::{pose_check, pressure};
-use crate::error::{Error, Result, line_of};
+use crate::error::{Error, Result, Warning, WarningKind, line_of};
 use crate::plant::Plant;
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -122,6 +122,9 @@ impl Outline {
                 true => {
                     "payload is \"none\", \"unknown\" or { mass = 2.0, com = [0, 0, 0.05] }".into()
                 }
+                false if message.contains("missing field `robot`") => {
+                    "it names no robot: state robot = \"…\", a robot.toml, a URDF or a bundled name (`excite robots`)".into()
+                }
                 false => message,
             };
             Error::file(path, at, message)
@@ -221,11 +224,14 @@ impl Outline {
             let record = Record::read_as(&e.logs, &self.plant, e.purpose, e.period, &e.reading)?;
             self.finished(e, record)
         };
-        let records = self
+        let mut records = self
             .entries
             .par_iter()
             .map(one)
             .collect::<Result<Vec<_>>>()?;
+        for (record, e) in records.iter_mut().zip(&self.entries) {
+            record.warnings.extend(self.fitted_too(e));
+        }
         Ok(Experiment {
             path: self.path,
             spec: self.spec,
@@ -276,9 +282,39 @@ impl Outline {
         )
     }
 
+    /// That a record which is held out is fitted as well, whole or in part.
+    fn fitted_too(&self, held: &Planned) -> Option<Warning> {
+        if held.purpose == Purpose::Fit {
+            return None;
+        }
+        let ends = |e: &Planned| {
+            let [from, to] = e.reading.part;
+            [from.unwrap_or(0.0), to.unwrap_or(f64::INFINITY)]
+        };
+        let [a, b] = ends(held);
+        let same = self.entries.iter().any(|e| {
+            let [c, d] = ends(e);
+            e.purpose == Purpose::Fit && e.logs == held.logs && a.max(c) < b.min(d)
+        });
+        same.then(|| {
+            Warning::new(
+                WarningKind::LogSuspect,
+                held.logs[0].display().to_string(),
+                "it is held out and fitted, too: what it says is no test on motion that was not fitted",
+            )
+        })
+    }
+
     /// A record as it was read, with what the experiment says of it.
     fn finished(&self, planned: &Planned, mut record: Record) -> Result<Record> {
         record.payload = planned.payload;
+        // parts of one log by their times
+        let also = self.entries.iter().filter(|e| e.logs == planned.logs);
+        let [from, to] = planned.reading.part;
+        if also.count() > 1 && (from.is_some() || to.is_some()) {
+            let end = to.map_or("the end".into(), |t| format!("{t} s"));
+            record.name = format!("{}, {} s to {end}", record.name, from.unwrap_or(0.0));
+        }
         let seen = pose_check::check(&self.plant, &record);
         record.warnings.extend(seen);
         if let Some(atmosphere) = self.atmosphere {
@@ -345,9 +381,8 @@ impl Entry {
                     .all(|x| x.is_finite());
                 if !(body.mass.is_finite() && body.mass > 0.0 && finite) {
                     return Err(format!(
-                        "the payload's mass is {} kg with centre of mass {:?}; it must be positive, all \
-                         numbers finite",
-                        body.mass, body.com
+                        "the payload's mass is {} kg; it must be positive, and all numbers of the payload finite",
+                        body.mass
                     ));
                 }
                 if body.com.is_none() && body.inertia.is_some() {

@@ -25,7 +25,10 @@ const MOST: usize = 30;
 
 /// That so few rows are left, and what was left out.
 pub(crate) fn too_few(rows: usize, warnings: &[Warning]) -> String {
-    let mut text = format!("{rows} rows are too few: there must be 8 or more");
+    let mut text = match rows {
+        1 => "1 row is too few: there must be 8 or more".to_string(),
+        _ => format!("{rows} rows are too few: there must be 8 or more"),
+    };
     for w in warnings
         .iter()
         .filter(|w| w.kind == WarningKind::RowsLeftOut)
@@ -173,13 +176,28 @@ impl Record {
 
     /// A record from the columns of a log.
     pub(super) fn of_table(
-        mut table: Table,
+        table: Table,
         path: &Path,
         plant: &Plant,
         purpose: Purpose,
         period: Option<f64>,
         part: [Option<f64>; 2],
     ) -> Result<Record> {
+        let (mut record, clock) = Self::repaired(table, path, plant, purpose, period, part)?;
+        record.written = record.before_grid(&clock);
+        record.put_on_grid(&clock)?;
+        Ok(record)
+    }
+
+    /// A record from the columns of a log, at the times at which they were taken.
+    fn repaired(
+        mut table: Table,
+        path: &Path,
+        plant: &Plant,
+        purpose: Purpose,
+        period: Option<f64>,
+        part: [Option<f64>; 2],
+    ) -> Result<(Record, Clock)> {
         let joints = plant.actuators();
         let n = joints.len();
         let mut warnings = std::mem::take(&mut table.warnings);
@@ -246,10 +264,14 @@ impl Record {
         record.check_channels(&joints)?;
         let duration = clock.t[clock.t.len() - 1] - clock.t[0];
         record.drop_wrong_period(clock.step, duration);
-        record.written = record.before_grid(&clock);
-        record.resample(&clock)?;
-        record.check_period();
-        Ok(record)
+        Ok((record, clock))
+    }
+
+    /// The record on an even grid, its period compared.
+    fn put_on_grid(&mut self, clock: &Clock) -> Result<()> {
+        self.resample(clock)?;
+        self.check_period();
+        Ok(())
     }
 
     /// Every channel with its name and how it is interpolated.

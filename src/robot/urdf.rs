@@ -23,6 +23,8 @@ mod read;
 mod source;
 mod tree;
 
+pub(crate) use limits::NO_LIMIT;
+
 use super::geometry::Form;
 use super::{Inertia, Placement, Robot};
 use crate::error::{Result, Warning};

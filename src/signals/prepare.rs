@@ -327,6 +327,17 @@ fn check(settings: &Settings, record: &Record) -> Result<()> {
             "a cut-off of {f} Hz: it must be positive"
         )));
     }
+    // infinity is how a caller leaves the filter out
+    if let Some(f) = settings.cutoff
+        && f.is_finite()
+        && f >= half
+    {
+        return Err(Error::Argument(format!(
+            "a cut-off of {f} Hz: {} is sampled with {:.6} Hz, so it must be below {half:.6} Hz",
+            record.path.display(),
+            record.rate()
+        )));
+    }
     Ok(())
 }
 
@@ -337,8 +348,9 @@ fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
     p.filter = Decimator::new(cutoff, p.rate, &p.valid, cyclic);
     if p.filter.outputs() < 4 {
         return Err(Error::Infeasible(format!(
-            "{}: after filtering at {cutoff:.3} Hz {} sound samples are left: too many were dropped, or the \
-             cut-off is too low",
+            "record {}: after filtering at {cutoff:.3} Hz {} sound samples are left. A sample counts where all channels are \
+             sound for as long as the filter reaches to either side: too many were dropped, or the cut-off is too low; a \
+             higher --cutoff reaches less far",
             p.name,
             p.filter.outputs()
         )));

@@ -1,10 +1,10 @@
 //! What the sensors make of a run, and the log that is written.
 
 use super::{Effects, Run};
-use crate::error::{Result, Warning, WarningKind};
+use crate::error::{Result, Warning};
 use crate::log::{Payload, Purpose, Record, pressure};
 use crate::output::write_atomic;
-use crate::plant::{DEFAULT_NOISE, Plant};
+use crate::plant::Plant;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write as _;
@@ -27,10 +27,8 @@ impl Sensors {
     /// is not stated is assumed, with a warning; position steps that are not stated are 0.
     pub fn new(plant: &Plant, scale: f64) -> (Self, Vec<Warning>) {
         let joints = plant.actuators();
-        let (noise, _) = plant.torque_noise();
+        let (noise, assumed) = plant.torque_noise();
         let torque_noise = noise.iter().map(|n| scale * n).collect();
-        let unstated = joints.iter().filter(|j| j.torque_noise.is_none());
-        let missing: Vec<&str> = unstated.map(|j| j.name.as_str()).collect();
         let resolution = joints
             .iter()
             .map(|j| match scale > 0.0 {
@@ -38,18 +36,7 @@ impl Sensors {
                 false => 0.0,
             })
             .collect();
-        let warnings = match missing.is_empty() || scale == 0.0 {
-            true => vec![],
-            false => vec![Warning::new(
-                WarningKind::TorqueNoiseAssumed,
-                "torque_noise",
-                format!(
-                    "not stated for {}: simulated as {} % of the effort limit",
-                    missing.join(", "),
-                    100.0 * DEFAULT_NOISE
-                ),
-            )],
-        };
+        let warnings = if scale == 0.0 { vec![] } else { assumed };
         let sensors = Sensors {
             torque_noise,
             resolution,

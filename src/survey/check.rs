@@ -73,6 +73,7 @@ fn frame(record: &Record, plant: &Plant) -> (Frame, Vec<Claim>) {
         step: record.step,
         columns: vec![record.t.clone()],
         gaps: Vec::new(),
+        silent: Vec::new(),
         warnings: Vec::new(),
     };
     let mut claims = vec![Claim {

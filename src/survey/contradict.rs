@@ -63,8 +63,10 @@ pub(super) fn contradict(
     let joints = plant.actuators();
     let n = joints.len();
     let best = &settled(problem, stated, best, plant);
-    let matches = &problem.matches(best, &mut Workspace::default());
     let differs = stated != best && contradicts(problem, best, stated);
+    // signs and gains of torques are those beside the positions as they will be read
+    let held = if differs { best } else { stated };
+    let matches = &problem.matches(held, &mut Workspace::default());
     for j in 0..n {
         let (stated_k, best_k) = (positions[stated.column[j]], positions[best.column[j]]);
         let same = stated_k == best_k && best.sign[j] == stated.sign[j];

@@ -3,6 +3,7 @@
 use super::claim::{Claim, Means};
 use super::frame::{Course, Frame};
 use super::{Survey, file_name};
+use crate::log::formats::detect;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -133,13 +134,18 @@ fn record(
     let names: Vec<String> = frame.paths.iter().map(|p| file_name(p)).collect();
     let _ = writeln!(
         out,
-        "\n[[record]]   # {}: {} rows, {:.2} s at {:.1} Hz\nlog = {log}\nformat = \"{}\"",
+        "\n[[record]]   # {}: {} rows, {:.2} s at {}\nlog = {log}",
         names.join(" + "),
         frame.rows,
         frame.duration(),
-        1.0 / frame.step,
-        survey.format.name()
+        frame.pace(),
     );
+    // files of several formats are told apart as they are read
+    let formats = frame.paths.iter().map(|p| detect(p).ok());
+    let formats: Vec<_> = formats.collect();
+    if formats.windows(2).all(|w| w[0] == w[1]) {
+        let _ = writeln!(out, "format = \"{}\"", survey.format.name());
+    }
     if let Some(topic) = &survey.topic {
         let _ = writeln!(out, "topic = {}", quoted(topic));
     }
@@ -278,6 +284,7 @@ fn group(out: &mut String, survey: &Survey, key: &str, means: Means) {
         Means::Current if !scaled => {
             "   # TODO: currents: state scale = [N m at the joint for each A]"
         }
+        Means::Current => "; gains by the nominal model: state those of the drives in scale",
         _ => "",
     };
     let _ = match parts.is_empty() {

@@ -256,17 +256,18 @@ pub(super) fn blocks(claims: &mut [Claim], plant: &Plant) {
         }
         // commands of positions and of torques do not stand in one row
         let like = part.iter().find(|c| sure(c) && c.means == means).cloned();
+        let alike = part.iter().filter(|c| sure(c) && c.means == means);
+        let middle = crate::median::median(alike.map(|c| c.scale));
         for (j, joint) in joints.iter().enumerate() {
             let c = &mut claims[from + j];
             if sure(c) && c.means == means {
                 continue;
             }
             let Some(like) = &like else { continue };
-            let torque = matches!(means, Means::Torque | Means::Current | Means::Command);
-            let scale = if torque && sure(c) {
-                c.scale
-            } else {
-                like.scale
+            // a torque in N m that turns out to be a current has the gain of currents
+            let scale = match sure(c) && kind(c) == kind(like) && c.unit == like.unit {
+                true => c.scale,
+                false => middle,
             };
             *c = Claim {
                 column: c.column.clone(),

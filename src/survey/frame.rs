@@ -2,7 +2,7 @@
 
 use super::claim::{Claim, Means};
 use super::file_name;
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, counted};
 use crate::log::Table;
 use crate::log::channels;
 use crate::log::clock;
@@ -38,6 +38,8 @@ pub struct Frame {
     pub columns: Vec<Vec<f64>>,
     /// from and to of each gap, s from the start
     pub gaps: Vec<[f64; 2]>,
+    /// columns without any number
+    pub silent: Vec<usize>,
     /// what was wrong
     pub warnings: Vec<Warning>,
 }
@@ -129,6 +131,7 @@ impl Frame {
         let count = (end / step + 0.1).floor() as usize + 1;
         let grid: Vec<f64> = (0..count).map(|i| i as f64 * step).collect();
         let mut columns = Vec::with_capacity(table.columns.len());
+        let mut silent = Vec::new();
         for (k, column) in table.columns.iter_mut().enumerate() {
             let mut y: Vec<f64> = match &clock.keep {
                 Some(keep) => keep.iter().map(|&i| column[i]).collect(),
@@ -144,8 +147,8 @@ impl Frame {
                     WarningKind::SamplesLeftOut,
                     format!("{subject}: {}", table.names[k]),
                     format!(
-                        "{} values cannot have been measured, the first at row {row} ({:e}); they count as dropped",
-                        wrong.len(),
+                        "{} cannot have been measured, the first at row {row} ({:e}): dropped",
+                        counted(wrong.len(), "value"),
                         y[at]
                     ),
                 ));
@@ -159,6 +162,7 @@ impl Frame {
                     "it holds no number at all: the channel was not recorded",
                 ));
                 columns.push(vec![0.0; count]);
+                silent.push(k);
                 continue;
             }
             if holes > wrong.len() {
@@ -187,6 +191,7 @@ impl Frame {
                 .iter()
                 .map(|g| [g[0] - first, g[1] - first])
                 .collect(),
+            silent,
             warnings,
         })
     }
@@ -194,6 +199,16 @@ impl Frame {
     /// Length, s.
     pub fn duration(&self) -> f64 {
         self.step * self.len().saturating_sub(1) as f64
+    }
+
+    /// How many rows a second there are, in words: by the usual step, and in the mean where that is another.
+    pub(super) fn pace(&self) -> String {
+        let usual = 1.0 / self.step;
+        let mean = self.rows.saturating_sub(1) as f64 / self.duration();
+        match (mean / usual - 1.0).abs() > 0.02 && mean.is_finite() {
+            true => format!("{mean:.1} Hz in the mean, {usual:.1} Hz by the usual step"),
+            false => format!("{usual:.1} Hz"),
+        }
     }
 
     /// Samples of the grid.
@@ -245,10 +260,8 @@ impl Frame {
                 };
                 let tau = self.channel(claims, Means::Torque, j);
                 let effort = robot.map_or(f64::INFINITY, |p| p.actuators()[j].limits.effort);
-                let saturated = tau.map_or(0, |tau| {
-                    let mut valid = vec![true; tau.len()];
-                    channels::saturated(&tau, effort, &mut valid).map_or(0, |(n, _)| n)
-                });
+                let clipped = tau.and_then(|tau| channels::saturated(&tau, effort));
+                let saturated = clipped.map_or(0, |c| c.count);
                 Course {
                     moves,
                     range: q.as_deref().map(extent),

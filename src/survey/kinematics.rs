@@ -46,6 +46,8 @@ pub(super) struct Fit {
     pub slope: f64,
     /// how much later it comes, s
     pub delay: f64,
+    /// whether that is the first or the last lag that was tried: the best one may lie beyond
+    pub at_end: bool,
 }
 
 impl Smooth {
@@ -125,7 +127,8 @@ impl Smooth {
         let all: Vec<(f64, f64)> = (-(most as i64)..=most as i64).map(score).collect();
         let best = (0..all.len()).max_by(|a, b| all[*a].0.total_cmp(&all[*b].0))?;
         let mut delay = best as f64 - most as f64;
-        if best > 0 && best + 1 < all.len() {
+        let at_end = best == 0 || best + 1 == all.len();
+        if !at_end {
             let (a, b, c) = (all[best - 1].0, all[best].0, all[best + 1].0);
             let bend = a - 2.0 * b + c;
             if bend < 0.0 {
@@ -136,6 +139,7 @@ impl Smooth {
             share: all[best].0,
             slope: all[best].1,
             delay: delay * self.step,
+            at_end,
         })
     }
 }
@@ -241,14 +245,20 @@ fn named_pairs(
         };
         // the factor between the claimed units: one where they agree
         let factor = f.slope * claims[k].factor() / claims[own].factor();
-        claims[k].delay = delay(f.delay, smooth.step);
+        // by how much a command is ahead is the controller's doing, and nothing to be taken out
+        let mut lag = String::new();
+        match velocity {
+            true => claims[k].delay = delay(&f, smooth.step),
+            false if f.delay < -0.5 * smooth.step => lag = ahead(&f),
+            false => {}
+        }
         if (factor - 1.0).abs() < 0.1 {
             if f.share > 0.95 {
                 for c in [k, own] {
                     claims[c].confidence = claims[c].confidence.max(0.97);
                 }
                 claims[k].evidence = format!(
-                    "its name; {:.1} % of it is {} {}",
+                    "its name; {:.1} % of it is {} {}{lag}",
                     100.0 * f.share,
                     if velocity {
                         "the derivative of"
@@ -294,9 +304,18 @@ fn named_pairs(
     }
 }
 
-/// A delay that is told from none: more than a quarter of a step.
-fn delay(x: f64, step: f64) -> f64 {
-    if x.abs() > 0.25 * step { x } else { 0.0 }
+/// A delay that is told from none: more than a quarter of a step, and not beyond the lags that were tried.
+fn delay(f: &Fit, step: f64) -> f64 {
+    match f.delay.abs() > 0.25 * step && !f.at_end {
+        true => f.delay,
+        false => 0.0,
+    }
+}
+
+/// By how much a command is ahead, in words.
+fn ahead(f: &Fit) -> String {
+    let more = if f.at_end { " or more" } else { "" };
+    format!(", {:.1} ms{more} ahead", -1e3 * f.delay)
 }
 
 /// Positions and velocities that have no names: pairs that are best for each other.
@@ -324,6 +343,7 @@ fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -
     fits.sort_by(|a, b| b.2.share.total_cmp(&a.2.share));
     let mut used: Vec<usize> = Vec::new();
     let mut roots: Vec<usize> = Vec::new();
+    let mut slopes: Vec<(usize, usize, f64)> = Vec::new();
     for (p, v, f) in fits.clone() {
         // a velocity has one position; what is itself a velocity has accelerations
         let root = claims[p].means == Means::Position && claims[p].of.is_none();
@@ -341,20 +361,22 @@ fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -
         used.push(v);
         roots.push(p);
         claims[v].of = Some(p);
-        claims[v].delay = delay(f.delay, smooth.step);
-        let s = f.slope;
-        let (scale, confidence) = match unit_factor(s) {
-            Some((exact, _)) => (1.0 / exact, 0.9),
-            None => (1.0 / s.abs(), 0.7),
+        claims[v].delay = delay(&f, smooth.step);
+        claims[v].confidence = match unit_factor(f.slope) {
+            Some(_) => 0.9,
+            None => 0.7,
         };
-        claims[v].sign = s.signum();
-        claims[v].scale = scale;
-        claims[v].confidence = confidence;
+        slopes.push((p, v, f.slope));
         claims[v].evidence = format!(
             "{:.2} % of it is the derivative of {}",
             100.0 * f.share,
             claims[p].column
         );
+    }
+    // sign and unit from those of what they derive from: velocities before accelerations
+    slopes.sort_by_key(|(p, ..)| used.contains(p));
+    for (p, v, slope) in slopes {
+        like(claims, p, v, slope);
     }
     // what derives from something is a velocity, what derives from a velocity an acceleration
     for &v in &used {
@@ -379,6 +401,13 @@ fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -
     }
 }
 
+/// Gives a column that is `slope` times what column `p` says, or its derivative, the sign and unit that follow.
+fn like(claims: &mut [Claim], p: usize, k: usize, slope: f64) {
+    let each = unit_factor(slope).map_or(1.0 / slope.abs(), |(exact, _)| 1.0 / exact);
+    claims[k].sign = slope.signum() * claims[p].sign;
+    claims[k].scale = each * claims[p].scale;
+}
+
 /// Unnamed columns that are a position of a joint once more: the command, where it is ahead.
 fn commands(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -> bool) {
     let positions: Vec<usize> = (0..claims.len())
@@ -395,20 +424,19 @@ fn commands(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -> boo
         let Some((p, f)) = best.filter(|(_, f)| f.share > TWIN) else {
             continue;
         };
-        let ahead = f.delay < -0.5 * smooth.step;
+        let leads = f.delay < -0.5 * smooth.step;
         let cleaner = smooth.rough[k] < 0.7 * smooth.rough[p];
-        if ahead || cleaner {
+        if leads || cleaner {
             claims[k].means = Means::Command;
             claims[k].commands = Some("position");
             claims[k].of = Some(p);
-            claims[k].sign = f.slope.signum();
-            claims[k].scale = unit_factor(f.slope).map_or(1.0 / f.slope.abs(), |(e, _)| 1.0 / e);
-            claims[k].confidence = if ahead { 0.9 } else { 0.6 };
+            like(claims, p, k, f.slope);
+            claims[k].confidence = if leads { 0.9 } else { 0.6 };
             claims[k].evidence = format!(
-                "{:.2} % of it is {}, {:.1} ms ahead",
+                "{:.2} % of it is {}{}",
                 100.0 * f.share,
                 claims[p].column,
-                -1e3 * f.delay
+                if leads { ahead(&f) } else { String::new() }
             );
         }
     }
@@ -421,7 +449,7 @@ fn number(claims: &mut [Claim]) {
         .filter(|&k| claims[k].means == Means::Position && claims[k].at.is_none())
         .collect();
     if named {
-        return;
+        return inherit(claims);
     }
     for (j, p) in roots.into_iter().enumerate() {
         claims[p].at = Some(j);

@@ -93,6 +93,11 @@ pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
         warnings.append(&mut f.warnings);
     }
     let mut claims = stated::claims(&frames, format, robot, &mut warnings);
+    for (k, claim) in claims.iter_mut().enumerate() {
+        if !frames.is_empty() && frames.iter().all(|f| f.silent.contains(&k)) {
+            claim.abstain("it holds no number at all: the channel was not recorded");
+        }
+    }
     kinematics::examine(&frames, &mut claims, robot.is_some(), &mut warnings);
     if let Some(plant) = robot {
         units::examine(&frames, &mut claims, plant, &mut warnings);

@@ -3,6 +3,7 @@
 use super::claim::Means;
 use super::frame::{Course, Frame};
 use super::{Survey, file_name};
+use crate::error::counted;
 use crate::report::format::significant;
 use crate::report::html::{self, Section, Tone};
 use crate::report::plot::{Axis, Colour, Panel, Rule, Series, Shape, time_series};
@@ -127,8 +128,8 @@ fn record(survey: &Survey, frame: &Frame, courses: &[Course]) -> Section {
         }
     }
     let body = html! {
-        p { (frame.rows) " rows, " (significant(frame.duration(), 4)) " s at " (significant(1.0 / frame.step, 4))
-            " Hz, time in " (frame.time_unit) "; " (frame.gaps.len()) " gaps"
+        p { (frame.rows) " rows, " (significant(frame.duration(), 4)) " s at " (frame.pace())
+            ", time in " (frame.time_unit) "; " (counted(frame.gaps.len(), "gap"))
             @if let Some(longest) = frame.gaps.iter().map(|g| g[1] - g[0]).max_by(f64::total_cmp) {
                 ", the longest " (significant(longest, 3)) " s"
             } "." }

@@ -62,6 +62,44 @@ pub(super) fn examine(
     if far.is_empty() {
         return;
     }
+    // a joint that slides and fits its limits in millimetres
+    for &k in &far {
+        let [low, high] = extent(frames, k);
+        let slides = claims[k].at.and_then(|j| joints.get(j));
+        let slides = slides.filter(|j| j.motion == Motion::Prismatic);
+        let f = 1e-3 * claims[k].factor();
+        let (low, high) = (low * f, high * f);
+        if slides.is_none_or(|joint| !fits(joint, low.min(high), low.max(high))) {
+            continue;
+        }
+        warnings.push(Warning::new(
+            WarningKind::UnitSuspect,
+            &claims[k].column,
+            format!(
+                "as the position of {} in m it is beyond its limits, and within them in mm: it was taken as millimetres",
+                claims[k].joint.clone().unwrap_or_default()
+            ),
+        ));
+        for (l, claim) in claims.iter_mut().enumerate() {
+            if l == k || claim.of == Some(k) && claim.means != Means::Command {
+                claim.scale *= 1e-3;
+                claim.unit = Some(match claim.means {
+                    Means::Velocity => "mm/s",
+                    Means::Acceleration => "mm/s^2",
+                    _ => "mm",
+                });
+                let why = "; millimetres, by the limits of the joint";
+                claim.evidence.push_str(why);
+            }
+        }
+    }
+    let far = far.into_iter();
+    let far: Vec<usize> = far
+        .filter(|&k| within(claims, k, 1.0) == Some(false))
+        .collect();
+    if far.is_empty() {
+        return;
+    }
     let turns = |k: &usize| {
         let [low, high] = extent(frames, *k);
         let revolute = claims[*k]

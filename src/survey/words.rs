@@ -2,6 +2,7 @@
 
 use super::claim::Means;
 use super::{Survey, file_name};
+use crate::error::counted;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -17,13 +18,13 @@ pub fn summary(survey: &Survey, files: &[PathBuf]) -> String {
         let names: Vec<String> = f.paths.iter().map(|p| file_name(p)).collect();
         let _ = writeln!(
             out,
-            "{}: {} rows, {:.2} s at {:.1} Hz (time in {}), {} gaps",
+            "{}: {} rows, {:.2} s at {} (time in {}), {}",
             names.join(" + "),
             f.rows,
             f.duration(),
-            1.0 / f.step,
+            f.pace(),
             f.time_unit,
-            f.gaps.len()
+            counted(f.gaps.len(), "gap")
         );
         for (name, c) in survey.joints.iter().zip(courses) {
             let range = c

@@ -163,6 +163,10 @@ impl Trajectory {
                 message,
             )
         };
+        if !text.trim_start().starts_with('{') {
+            let message = "it is no trajectory.json (`excite design` writes one)";
+            return Err(Error::file(path, "", message));
+        }
         let header: Header = serde_json::from_str(text).map_err(malformed)?;
         if header.format.as_deref() != Some(FORMAT) {
             let message = format!("is not a trajectory; {FORMAT:?} expected");

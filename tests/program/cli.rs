@@ -407,3 +407,95 @@ fn a_folder_of_its_name_does_not_hide_a_bundled_robot() {
     let out = beside.run("calibrate beside.toml --output beside");
     assert_eq!(out.status, 0, "{}", out.stderr);
 }
+
+/// A file of the user is never taken for no file, and a record is what it says.
+#[test]
+fn simulate_leaves_an_experiment_as_it_is() {
+    let t = Test::new().file("kept.toml", b"robot = \"planar2\" # caf\xe9\n");
+    let line = "design planar2 --starts 1 --harmonics 2 --period 4 --rate 50 --output d";
+    assert_eq!(t.run(line).status, 0);
+    let run = "simulate planar2 d/trajectory.json --rate 50 --step 1e-3";
+    t.fails(
+        &format!("{run} --output a.csv --experiment kept.toml"),
+        1,
+        &["kept.toml"],
+    );
+    let kept = std::fs::read(t.path().join("kept.toml")).unwrap();
+    assert!(kept.ends_with(b"caf\xe9\n"));
+    assert!(!t.path().join("a.csv").exists());
+    // a comment makes no other robot
+    let t = t.file("e.toml", "robot = \"planar2\"   # mine\n");
+    let first = format!("{run} --output b.csv --experiment e.toml");
+    assert_eq!(t.run(&first).status, 0);
+    assert_eq!(t.run(&format!("{first} --force")).status, 0);
+    let text = std::fs::read_to_string(t.path().join("e.toml")).unwrap();
+    assert_eq!(text.matches("[[record]]").count(), 1, "{text}");
+    for (more, word) in [("--use holdout", "use"), ("--payload 1,0,0,0", "payload")] {
+        t.fails(&format!("{first} --force {more}"), 1, &["b.csv", word]);
+    }
+    assert_eq!(
+        text,
+        std::fs::read_to_string(t.path().join("e.toml")).unwrap()
+    );
+}
+
+/// One log that is fitted and held out tests nothing, and one record counts once.
+#[test]
+fn a_record_that_counts_twice_is_named() {
+    let t = Test::new();
+    for line in [
+        "design planar2 --starts 1 --harmonics 2 --period 4 --rate 50 --output d",
+        "simulate planar2 d/trajectory.json --rate 50 --step 1e-3 --output a.csv --experiment e.toml",
+        "condense e.toml --cutoff 10 --output a.factor",
+    ] {
+        let out = t.run(line);
+        assert_eq!(out.status, 0, "{line}\n{}", out.stderr);
+    }
+    let out = t.run("merge a.factor a.factor --output m");
+    assert!(
+        out.stderr.contains("hold the same numbers"),
+        "{}",
+        out.stderr
+    );
+    let text = std::fs::read_to_string(t.path().join("e.toml")).unwrap();
+    let twice = format!("{text}\n[[record]]\nlog = \"a.csv\"\nuse = \"holdout\"\n");
+    let t = t.file("twice.toml", twice);
+    let out = t.run("identify twice.toml --output i");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    assert!(out.stderr.contains("fitted, too"), "{}", out.stderr);
+    // a cut-off that the samples cannot have
+    t.fails(
+        "identify e.toml --cutoff 5000 --output j",
+        2,
+        &["5000", "25"],
+    );
+    t.fails(
+        "identify e.toml --identify none,viscous --output j",
+        2,
+        &["none"],
+    );
+}
+
+/// Other readers want velocity and effort in each limit, and take an end that is missing for 0.
+#[test]
+fn a_urdf_is_written_with_whole_limits() {
+    let urdf = r#"<robot name="slide"><link name="base"/><link name="cart"><inertial><mass value="2"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/></joint></robot>"#;
+    let t = Test::new().file("slide.urdf", urdf);
+    let out = t.run("export slide.urdf --to urdf --output w");
+    assert_eq!(out.status, 0, "{}", out.stderr);
+    let text = std::fs::read_to_string(t.path().join("w/robot.urdf")).unwrap();
+    for word in [
+        "lower=\"-1000000000\"",
+        "upper=\"1000000000\"",
+        "velocity=",
+        "effort=",
+    ] {
+        assert!(text.contains(word), "{word}:\n{text}");
+    }
+    let again = excite::Plant::load(t.path().join("w/robot.urdf").to_str().unwrap()).unwrap();
+    let limits = again.actuators()[0].limits;
+    assert_eq!(limits.position, [f64::NEG_INFINITY, f64::INFINITY]);
+    assert!(limits.velocity.is_infinite() && limits.effort.is_infinite());
+}

@@ -46,7 +46,7 @@ const COUNT: usize = 120;
 const USUAL: Duration = Duration::from_secs(40);
 
 /// Files, and the commands that read each.
-const TARGETS: [(&str, &[&str]); 16] = [
+const TARGETS: [(&str, &[&str]); 31] = [
     (
         "arm.urdf",
         &[
@@ -147,6 +147,67 @@ const TARGETS: [(&str, &[&str]); 16] = [
             "diagnose delta_experiment.toml --no-next --output o --force",
         ],
     ),
+    // logs of others
+    ("foreign.csv", FOREIGN),
+    ("two_none.mcap", FOREIGN),
+    ("two_zstd.mcap", FOREIGN),
+    ("two_lz4.mcap", FOREIGN),
+    ("two.db3", FOREIGN),
+    ("two.mat", FOREIGN),
+    ("two.npz", FOREIGN),
+    ("two_packed.npz", FOREIGN),
+    (
+        "foreign.toml",
+        &[
+            "identify foreign.toml --output o --force",
+            "diagnose foreign.toml --no-next --output o --force",
+        ],
+    ),
+    (
+        "day.factor",
+        &["merge day.factor --robot arm.toml --output o --force"],
+    ),
+    (
+        "arm.xml",
+        &[
+            "identifiability arm.xml --output o --force",
+            "torque arm.xml samples.csv",
+            "identify experiment.toml --into arm.xml --output o --force",
+        ],
+    ),
+    (
+        "calibration.toml",
+        &[
+            "calibrate calibration.toml --output o --force",
+            "diagnose calibration.toml --output o --force",
+        ],
+    ),
+    (
+        "measured.csv",
+        &[
+            "calibrate calibration.toml --output o --force",
+            "diagnose calibration.toml --output o --force",
+        ],
+    ),
+    (
+        "boxed.urdf",
+        &[
+            "move boxed.urdf trajectory.json --from 0,0 --tries 20 --rate 50 --output o --force",
+            "poses boxed.urdf --count 12 --output o --force",
+            "design boxed.urdf --starts 1 --harmonics 2 --time-limit 2 --rate 50 --threads 1 --output o --force",
+        ],
+    ),
+    (
+        "box.stl",
+        &["move boxed.urdf trajectory.json --from 0,0 --tries 20 --rate 50 --output o --force"],
+    ),
+];
+
+/// `FILE` stands for the mutated file.
+const FOREIGN: &[&str] = &[
+    "log FILE --output o --force",
+    "log FILE --robot arm.toml --output o --force",
+    "identify FILE --robot arm.toml --output o --force",
 ];
 
 /// Runs the program with a limit of memory and time; status (`None`: it was killed) and messages.
@@ -235,6 +296,9 @@ coincide = "position"
         format!("{simulate} --periods 2 --seed 1 --output check.csv --use holdout"),
         "design delta.toml --starts 1 --harmonics 2 --period 2 --rate 50 --output d".into(),
         "simulate delta.toml platform.json --periods 2 --rate 50 --step 1e-3 --output delta.csv --experiment delta_experiment.toml".into(),
+        "identify experiment.toml --output i".into(),
+        "condense experiment.toml --cutoff 10 --output day.factor".into(),
+        "poses arm.toml --count 24 --kind position --rehearse 1 --output p".into(),
     ] {
         let (status, messages) = run(folder, &line);
         assert_eq!(status, Some(0), "{line}\n{messages}");
@@ -243,6 +307,9 @@ coincide = "position"
             ("a/samples.csv", "samples.csv"),
             ("d/trajectory.json", "platform.json"),
             ("d/samples.csv", "platform.csv"),
+            ("i/robot.xml", "arm.xml"),
+            ("p/calibration.toml", "calibration.toml"),
+            ("p/measured.csv", "measured.csv"),
         ] {
             let _ = std::fs::copy(folder.join(from), folder.join(to));
         }
@@ -250,6 +317,69 @@ coincide = "position"
     let experiment = std::fs::read_to_string(folder.join("experiment.toml")).unwrap();
     let load = experiment.replacen("use = \"fit\"", "use = \"fit\"\npayload = \"unknown\"", 1);
     std::fs::write(folder.join("load.toml"), load).unwrap();
+    logs_of_others(folder);
+    // a body with a mesh, and one with a box
+    let urdf = std::fs::read_to_string(folder.join("arm.urdf")).unwrap();
+    let volumes = [
+        r#"<mesh filename="box.stl"/>"#,
+        r#"<box size="0.1 0.05 0.05"/>"#,
+    ];
+    let ends: Vec<&str> = urdf.split("</link>").collect();
+    let [first, second, rest] = ends[..] else {
+        panic!("two links: {urdf}")
+    };
+    let [first, second] = [(first, volumes[0]), (second, volumes[1])].map(|(link, volume)| {
+        format!("{link}<collision><geometry>{volume}</geometry></collision></link>")
+    });
+    let with = format!("{first}{second}{rest}");
+    std::fs::write(folder.join("boxed.urdf"), with).unwrap();
+    std::fs::write(folder.join("box.stl"), tetrahedron()).unwrap();
+}
+
+/// Bags and arrays as they are tested elsewhere, and a table without our names.
+fn logs_of_others(folder: &Path) {
+    let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/logs");
+    for entry in std::fs::read_dir(logs).unwrap() {
+        let from = entry.unwrap().path();
+        std::fs::copy(&from, folder.join(from.file_name().unwrap())).unwrap();
+    }
+    let ours = std::fs::read_to_string(folder.join("fit.csv")).unwrap();
+    let header = ours.lines().next().unwrap();
+    let others = header
+        .replace("dq", "velocity_")
+        .replace("qref", "target_")
+        .replace("tau", "effort_")
+        .replace('q', "position_")
+        .replacen("t,", "stamp [s],", 1);
+    let table = ours.replacen(header, &others, 1).replace(',', "; ");
+    std::fs::write(folder.join("foreign.csv"), table).unwrap();
+    let line = "log foreign.csv --robot arm.toml --output f";
+    let (status, messages) = run(folder, line);
+    assert_eq!(status, Some(0), "{line}\n{messages}");
+    let toml = std::fs::read_to_string(folder.join("f/experiment.toml")).unwrap();
+    std::fs::write(folder.join("foreign.toml"), toml.replace("../", "")).unwrap();
+    let line = "identify foreign.toml --output f --force";
+    let (status, messages) = run(folder, line);
+    assert_eq!(status, Some(0), "{line}\n{messages}\n{toml}");
+}
+
+/// A solid of four triangles, 0.1 m.
+fn tetrahedron() -> Vec<u8> {
+    let corners = [
+        [0.0f32, 0.0, 0.0],
+        [0.1, 0.0, 0.0],
+        [0.0, 0.1, 0.0],
+        [0.0, 0.0, 0.1],
+    ];
+    let mut file = vec![b' '; 80];
+    file.extend(4u32.to_le_bytes());
+    for triangle in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
+        file.extend([0; 12]);
+        let points = triangle.iter().flat_map(|k| corners[*k]);
+        file.extend(points.flat_map(f32::to_le_bytes));
+        file.extend([0; 2]);
+    }
+    file
 }
 
 /// Where the numbers of a text stand.
@@ -281,8 +411,11 @@ fn numbers(text: &[u8]) -> Vec<(usize, usize)> {
 /// The text with one to three changes.
 fn mutated(text: &[u8], r: &mut ChaCha8Rng) -> Vec<u8> {
     let mut text = text.to_vec();
+    let binary = std::str::from_utf8(&text).is_err() || text.contains(&0);
     for _ in 0..[1, 1, 1, 2, 3][r.random_range(0..5)] {
-        let kind = r.random_range(0..20);
+        // of a binary file, bytes are changed rather than numbers
+        let least = if binary { 12 } else { 0 };
+        let kind = r.random_range(least..20);
         let at = r
             .random_range(0..text.len().max(1))
             .min(text.len().saturating_sub(1));
@@ -368,7 +501,8 @@ fn no_file_makes_the_program_panic_abort_or_hang() {
             break;
         }
         let (file, commands) = TARGETS[r.random_range(0..TARGETS.len())];
-        let command = commands[r.random_range(0..commands.len())];
+        let command = commands[r.random_range(0..commands.len())].replace("FILE", file);
+        let command = command.as_str();
         let good = std::fs::read(folder.join(file)).unwrap();
         let bad = mutated(&good, &mut r);
         std::fs::write(folder.join(file), &bad).unwrap();

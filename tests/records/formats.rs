@@ -227,6 +227,23 @@ fn damaged_files_do_not_end_the_program() {
     }
 }
 
+/// A zero within the name of a joint: such messages are damaged, whatever else is wrong.
+#[test]
+fn names_with_zeros_are_damaged_messages() {
+    let dir = folder();
+    let logs = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/logs");
+    let mut bag = std::fs::read(logs.join("two_none.mcap")).unwrap();
+    let name = b"wrist_a";
+    let places: Vec<usize> = (0..bag.len() - name.len())
+        .filter(|&i| bag[i..].starts_with(name))
+        .collect();
+    assert!(places.len() > 10, "{}", places.len());
+    places.iter().for_each(|i| bag[i + 3] = 0);
+    std::fs::write(dir.path().join("zeros.mcap"), bag).unwrap();
+    let e = error(dir.path(), "log = \"zeros.mcap\"");
+    assert!(e.contains("no messages"), "{e}");
+}
+
 /// A table in some layout: a line before the rows, one row, what stands between.
 fn table(dir: &Path, head: &str, row: impl Fn(f64, [f64; 2], [f64; 2]) -> String) {
     let mut text = String::from(head);

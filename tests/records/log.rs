@@ -88,7 +88,7 @@ fn time_stamps_are_repaired_and_said() {
         }
     }))
     .unwrap();
-    says(&r, &["1 gaps in the time", "40 samples"]);
+    says(&r, &["1 gap in the time", "40 samples"]);
     assert_eq!(r.len(), 2000);
     assert!(!r.valid[520] && r.valid[400] && r.valid[600]);
     // duplicates
@@ -160,7 +160,7 @@ fn wrong_time_stamps_are_named_and_left_out() {
         }
     }))
     .unwrap();
-    says(&r, &["jumps ahead", "row 501", "1 gaps"]);
+    says(&r, &["jumps ahead", "row 501", "1 gap"]);
     assert!((1000..1020).contains(&r.len()), "{}", r.len());
     // jumps everywhere
     for size in [1e9, 1e200] {
@@ -316,7 +316,7 @@ fn corrupt_rows_are_named_and_left_out() {
             "2 lines are no rows",
             "line 43: it has 4 cells instead of 5",
             "line 101: column q2: `fault` is not a number",
-            "q1: 1 values cannot have been measured, the first at row 399",
+            "q1: 1 value cannot have been measured, the first at row 399",
         ],
     );
     assert_eq!(r.warnings.len(), 5, "{:#?}", r.warnings);

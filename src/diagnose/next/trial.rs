@@ -80,20 +80,37 @@ impl<'a> Placed<'a> {
         Some(projected.energies(self.eta).0 / evidence.data.fitted.max(1) as f64)
     }
 
-    /// With the fitted shape and others of its grid, in all no more than `most`.
-    fn shapes(&self, evidence: &Evidence, cx: &Context, most: usize) -> Vec<Projected> {
+    /// The largest figure among the fitted shape and others of its grid, in all no more than `most`.
+    fn largest(
+        &self,
+        evidence: &Evidence,
+        cx: &Context,
+        most: usize,
+        figure: impl Fn(&Projected) -> f64,
+    ) -> Option<f64> {
         let grid = self.effect.shapes(cx, self.place);
         let stride = grid.len().div_ceil(most.max(2) - 1).max(1);
         let others = grid.into_iter().step_by(stride).filter(|s| s != self.shape);
-        let all = std::iter::once(self.shape.clone()).chain(others);
-        let sets: Vec<_> = all
+        let mut sets = std::iter::once(self.shape.clone())
+            .chain(others)
             .enumerate()
             .map(|(i, s)| self.effect.columns(cx, self.place, &s, i > 0))
-            .filter(|c| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()))
-            .collect();
-        evidence.project_all(&sets)
+            .filter(|c| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()));
+        let mut largest: Option<f64> = None;
+        loop {
+            // a few at once: fast, and few columns are held
+            let some: Vec<_> = sets.by_ref().take(TOGETHER).collect();
+            if some.is_empty() {
+                return largest;
+            }
+            let figures = evidence.project_all(&some).into_iter().map(|z| figure(&z));
+            largest = largest.into_iter().chain(figures).reduce(f64::max);
+        }
     }
 }
+
+/// Shapes whose columns are whitened and projected at once.
+const TOGETHER: usize = 4;
 
 /// What a motion is to tell apart.
 pub(super) enum Target<'a> {
@@ -116,9 +133,7 @@ impl Target<'_> {
                 if a.z.len() != eta.len() || a.energy(eta).0 <= enough {
                     return None;
                 }
-                let rivals = b.shapes(evidence, cx, shapes);
-                let each = rivals.iter().map(|b| evidence.overlap(&a, eta, b));
-                each.reduce(f64::max)
+                b.largest(evidence, cx, shapes, |b| evidence.overlap(&a, eta, b))
             }
             Target::Hidden(a, least) => {
                 // a slow motion shows a large share of next to nothing
@@ -127,10 +142,7 @@ impl Target<'_> {
                 }
                 let seen = match a.eta {
                     Some(eta) => Some(a.projected(evidence, cx)?.visibility(Some(eta))),
-                    None => {
-                        let all = a.shapes(evidence, cx, shapes);
-                        all.iter().map(|z| z.visibility(None)).reduce(f64::max)
-                    }
+                    None => a.largest(evidence, cx, shapes, |z| z.visibility(None)),
                 };
                 seen.map(|v| 1.0 - v)
             }

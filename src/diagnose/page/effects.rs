@@ -106,28 +106,32 @@ pub(super) fn shrink(d: &Diagnosis) -> Markup {
             ]
         })
         .collect();
-    let mut total = 0.0;
-    let steps: Vec<Vec<Markup>> = d
-        .findings
-        .iter()
-        .filter(|f| f.member)
+    let members = || d.findings.iter().filter(|f| f.member);
+    let mut steps: Vec<Vec<Markup>> = members()
         .map(|f| {
-            total += f.holdout.unwrap_or(0.0);
             vec![
-                html! { (f.title) },
+                html! { (f.title) @if !f.is_claim() { div { small { "not claimed" } } } },
                 html! { (percent(f.explains)) },
                 html! { (held(f)) },
-                html! { @if d.holdout.is_some() { (percent(total.clamp(0.0, 1.0))) } @else { "–" } },
             ]
         })
         .collect();
+    if members().count() > 1 {
+        let gone = d.shrink().map_or("–".into(), percent);
+        steps.push(vec![
+            html! { strong { "all together" } },
+            html! { (percent(1.0 - d.unexplained)) },
+            html! { (gone) },
+        ]);
+    }
     html! {
         p { "Gap of all joints in multiples of their noise (root of the mean energy above the noise), record by record. Holdout records were \
             not fitted to." }
         (table(&["record", "use", "frozen", "refitted", "with the effects", "of the energy gone"], &[1], &rows))
         @if !steps.is_empty() {
             h3 { "Effect by effect" }
-            (table(&["effect", "of the fitted gap", "of the holdout gap", "sum on holdout"], &[], &steps))
+            @if steps.len() > 1 { p { "Each is what comes back when that effect alone is taken out: the shares need not add up." } }
+            (table(&["effect", "of the fitted gap", "of the holdout gap"], &[], &steps))
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The files of the improved model, and what changed in them.
 
 use super::Diagnosis;
+use crate::error::WarningKind;
 use crate::report::html::table;
 use maud::{Markup, html};
 
@@ -20,7 +21,10 @@ pub(super) fn simulators(d: &Diagnosis) -> Markup {
         p {
             "Written beside this report: "
             @for (i, file) in d.improved.files.iter().enumerate() { @if i > 0 { ", " } code { (file) } }
-            ". All hold the refitted parameters."
+            (match d.warnings.iter().any(|w| w.kind == WarningKind::InertiaImpossible) {
+                true => ". Bodies with the refitted parameters cannot exist: the files hold the nearest that can.",
+                false => ". All hold the refitted parameters.",
+            })
             @if d.improved.files.contains(&"effects.py") {
                 " " code { "effects.install(model)" } " makes MuJoCo add what " code { "robot.xml" } " has no element for; "
                 code { "effects.inverse(model, q, dq, ddq, dt)" } " gives the torque along a motion with all of it."

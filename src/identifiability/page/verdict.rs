@@ -168,6 +168,17 @@ pub fn verdict(a: &Assessment) -> Verdict {
     } else {
         "assumed"
     };
+    if judged == 0 {
+        return Verdict {
+            grade: Grade::Weak,
+            text: format!(
+                "Inside its limits, but how well the model will be known cannot be told: {limits}, {}, condition number {}; all \
+                 nominal values are 0, so there is nothing to compare with. State masses and friction, if only roughly. {unchecked}",
+                count(b, "base parameter"),
+                significant(condition, 3),
+            ),
+        };
+    }
     let of = if judged == b {
         format!("{known} of {judged}")
     } else {

@@ -2,10 +2,18 @@
 
 use crate::identify::Identification;
 use crate::identify::doubts::predicts_worse;
+use crate::identify::validation::JointError;
 use crate::plant::Plant;
 use crate::report::format::{NBSP, percent, significant};
 use crate::report::html::{self, Tone};
 use maud::Markup;
+
+/// Joints of which a model leaves as much as their torque.
+fn beyond(joints: &[JointError]) -> Option<String> {
+    let all = joints.iter().filter(|j| j.relative_error >= 1.0);
+    let names: Vec<&str> = all.map(|j| j.joint.as_str()).collect();
+    (!names.is_empty()).then(|| names.join(", "))
+}
 
 /// The verdict in words, and its tone.
 pub fn verdict(plant: &Plant, id: &Identification) -> (Tone, String) {
@@ -34,6 +42,11 @@ pub fn verdict(plant: &Plant, id: &Identification) -> (Tone, String) {
                 text += " It does not carry over well: the fit records excite other motion, or the robot \
                          does something that the model lacks; look at the joints with the largest holdout error.";
                 Tone::Bad
+            } else if let Some(names) = beyond(&h.joints) {
+                text += &format!(
+                    " It carries over, but not to {names}: there it leaves as much as the torque itself and more."
+                );
+                Tone::Fair
             } else if h.relative_error > 0.1 {
                 text += " It carries over, but a tenth or more of the torque is something else than this model.";
                 Tone::Fair

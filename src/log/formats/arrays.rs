@@ -44,8 +44,9 @@ pub(super) fn table(arrays: Vec<Array>, path: &Path) -> Result<Table> {
     let samples = arrays
         .iter()
         .flat_map(|a| [a.rows, a.columns])
-        .max_by_key(|&n| (weight(n), n))
-        .filter(|n| *n > 1);
+        // a list is one column wide, and a number is no series
+        .filter(|n| *n > 1)
+        .max_by_key(|&n| (weight(n), n));
     let Some(samples) = samples else {
         return Err(Error::file(path, "", "it holds no array of samples"));
     };
@@ -81,4 +82,37 @@ pub(super) fn table(arrays: Vec<Array>, path: &Path) -> Result<Table> {
         ));
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn array(name: &str, rows: usize, columns: usize) -> Array {
+        let values = (0..rows * columns).map(|i| i as f64).collect();
+        Array {
+            name: name.into(),
+            rows,
+            columns,
+            values,
+        }
+    }
+
+    #[test]
+    fn numbers_and_lists_of_other_lengths_stand_beside_series() {
+        let all = vec![
+            array("fs", 1, 1),
+            array("t", 100, 1),
+            array("q", 100, 2),
+            array("limits", 30, 1),
+        ];
+        let table = table(all, Path::new("log.npz")).unwrap();
+        assert_eq!(table.names, ["t", "q[0]", "q[1]"]);
+        assert_eq!(table.columns[2][99], 199.0);
+        assert!(
+            table.warnings[0].message.contains("limits"),
+            "{:?}",
+            table.warnings
+        );
+    }
 }

@@ -15,7 +15,7 @@ mod layout;
 pub(super) use layout::append;
 
 use super::cdr::Cdr;
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, counted};
 use crate::log::Table;
 use layout::{Layout, merge};
 use std::ops::ControlFlow;
@@ -242,11 +242,15 @@ impl<'a> Collector<'a> {
                 true => "it has no topics".to_string(),
                 false => format!("its topics are {}", listed.join(", ")),
             };
+            let damaged = match self.topics.iter().map(|t| t.damaged).sum() {
+                0 => String::new(),
+                n => format!("; {} damaged", counted(n, "message")),
+            };
             let message = match &self.wanted {
-                Some(w) => format!("topic {w} has no messages that are read; {topics}"),
+                Some(w) => format!("topic {w} has no messages that are read; {topics}{damaged}"),
                 None => format!(
                     "it has no messages with states of joints (JointState, JointTrajectoryControllerState, \
-                     DynamicJointState, Float64MultiArray); {topics}"
+                     DynamicJointState, Float64MultiArray); {topics}{damaged}"
                 ),
             };
             return Err(Error::file(path, "", message));
@@ -411,5 +415,7 @@ fn decode(
 
 fn texts<'a>(cdr: &mut Cdr<'a>) -> Option<Vec<&'a [u8]>> {
     let n = cdr.u32()?;
-    (0..n).map(|_| cdr.text()).collect()
+    // zeros separate the names of columns
+    let text = |_| cdr.text().filter(|t| !t.contains(&0));
+    (0..n).map(text).collect()
 }

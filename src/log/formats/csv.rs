@@ -184,14 +184,25 @@ pub(crate) fn read_parts<T>(
             WarningKind::RowsLeftOut,
             path.display().to_string(),
             format!(
-                "{} lines are no rows and were left out: {first}{more}",
-                left.count
+                "{} left out: {first}{more}",
+                match left.count {
+                    1 => "1 line is no row and was".to_string(),
+                    n => format!("{n} lines are no rows and were"),
+                }
             ),
         ));
     }
     if rows == 0 && keep.contains(&true) {
         return Err(no_numbers(path, &[]));
     }
+    table.warnings.extend(times_as_texts(&dialect, path));
+    table.warnings.extend(dialect.unused.iter().map(|what| {
+        Warning::new(
+            WarningKind::ColumnsIgnored,
+            path.display().to_string(),
+            format!("its header has {what}: it was not used, and the columns are called by their numbers"),
+        )
+    }));
     without_texts(&mut table, &dialect);
     Ok((table, checked))
 }
@@ -217,6 +228,29 @@ fn without_texts(table: &mut Table, dialect: &Dialect) {
         table.names.remove(k);
         table.columns.remove(k);
     }
+}
+
+/// Columns of texts that are called a time: stamps of a kind that is not known.
+fn times_as_texts(dialect: &Dialect, path: &Path) -> Option<Warning> {
+    let time = |name: &str| {
+        let name = name.to_lowercase();
+        name == "t" || name.contains("time") || name.contains("stamp")
+    };
+    let all = dialect.names.iter().zip(&dialect.cells);
+    let lost: Vec<&str> = all
+        .filter(|(name, cell)| **cell == Cell::Text && time(name))
+        .map(|(name, _)| name.as_str())
+        .collect();
+    (!lost.is_empty()).then(|| {
+        Warning::new(
+            WarningKind::ColumnsIgnored,
+            path.display().to_string(),
+            format!(
+                "{}: called a time, and neither numbers nor dates that are known: left out",
+                lost.join(", ")
+            ),
+        )
+    })
 }
 
 fn no_numbers(path: &Path, text: &[u8]) -> Error {
@@ -370,6 +404,7 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
             if k < n && keep[k] {
                 let value = match cells[k] {
                     Cell::Number => number::parse(cell),
+                    Cell::Empty => Some(number::parse(cell).unwrap_or(f64::NAN)),
                     _ => stamp(cell).or(cell.trim_ascii().is_empty().then_some(f64::NAN)),
                 };
                 match value {
@@ -391,10 +426,9 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
             }
         }
         // a delimiter behind the last cell of every line is no cell
-        if k != n
-            && !(k == n + 1
-                && text[..at.min(text.len())].trim_ascii_end().last() == Some(&delimiter))
-        {
+        let ends = |b: &&u8| **b == delimiter || !b.is_ascii_whitespace();
+        let last = || text[..at.min(text.len())].iter().rev().find(ends);
+        if k != n && !(k == n + 1 && last() == Some(&delimiter)) {
             wrong = Some(format!("it has {k} cells instead of {n}"));
         }
         if let Some(message) = wrong {

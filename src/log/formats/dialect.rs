@@ -2,6 +2,7 @@
 //! lists in cells, columns of texts and of stamps.
 
 use crate::log::number;
+use crate::log::unit::unit;
 
 /// Lines that are looked at.
 const LINES: usize = 200;
@@ -13,6 +14,8 @@ pub(crate) enum Cell {
     Number,
     /// a date or a time of day
     Stamp,
+    /// nothing in the lines that were looked at: numbers may come later
+    Empty,
     /// anything else
     Text,
 }
@@ -32,9 +35,8 @@ pub(crate) struct Dialect {
     pub cells: Vec<Cell>,
     /// lines before the first of numbers
     pub head: usize,
-    /// whether the names stand in the file
-    #[allow(dead_code)]
-    pub named: bool,
+    /// a line that looks like names and was not used, because it has so many for other columns
+    pub unused: Option<String>,
 }
 
 /// Whether a line has nothing to read.
@@ -62,7 +64,9 @@ pub(super) fn canonical(text: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u
             out.extend(end);
             continue;
         }
-        let body = body.trim_ascii_end();
+        let blank = |b: &u8| b.is_ascii_whitespace() && (*b != delimiter || delimiter == b' ');
+        let ends = body.iter().rev().take_while(|b| blank(b)).count();
+        let body = &body[..body.len() - ends];
         let body = if delimiter == b' ' {
             body.trim_ascii_start()
         } else {
@@ -126,6 +130,16 @@ fn last(out: &[u8]) -> Option<u8> {
 /// A date, a time of day, or both, in seconds.
 pub(crate) fn stamp(cell: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(cell).ok()?.trim().trim_matches('"');
+    let half = |name: &str| {
+        let at = text.len().checked_sub(2)?;
+        let (before, end) = (text.get(..at)?, text.get(at..)?);
+        end.eq_ignore_ascii_case(name).then(|| before.trim_end())
+    };
+    let (text, noon) = match (half("AM"), half("PM")) {
+        (Some(text), _) => (text, Some(0.0)),
+        (_, Some(text)) => (text, Some(12.0)),
+        _ => (text, None),
+    };
     let (date, time) = match text.split_once(['T', ' ']) {
         Some((d, t)) => (Some(d), t.trim()),
         None => (None, text),
@@ -143,10 +157,12 @@ pub(crate) fn stamp(cell: &[u8]) -> Option<f64> {
             (365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + d - 1 - 719_468) as f64
         }
     };
+    // the zone is the same throughout a log
     let time = time.trim_end_matches('Z').trim();
-    let time = time.split('+').next()?;
+    let time = time.split(['+', '-']).next()?;
     let mut parts = time.split(':');
     let (h, m): (f64, f64) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
+    let h = noon.map_or(h, |noon| h % 12.0 + noon);
     let s: f64 = parts
         .next()
         .map_or(Ok(0.0), |s| s.replace(',', ".").parse())
@@ -218,16 +234,21 @@ impl Dialect {
         let first = rows.first()?.0;
         let mut kinds = Vec::with_capacity(n);
         for k in 0..n {
-            let of = |test: &dyn Fn(&[u8]) -> bool| rows.iter().filter(|r| test(&r.1[k])).count();
+            let of = |test: &dyn Fn(&[u8]) -> bool| {
+                let full = rows.iter().map(|r| &r.1[k]);
+                full.filter(|c| !c.trim_ascii().is_empty() && test(c))
+                    .count()
+            };
+            // empty cells say nothing
+            let full = of(&|_| true);
             let numbers = of(&|c| number::parse(c).is_some());
             let stamps = of(&|c| stamp(c).is_some());
-            kinds.push(
-                match (2 * numbers >= rows.len(), 2 * stamps >= rows.len()) {
-                    (true, _) => Cell::Number,
-                    (_, true) => Cell::Stamp,
-                    _ => Cell::Text,
-                },
-            );
+            kinds.push(match (2 * numbers >= full, 2 * stamps >= full) {
+                _ if full == 0 => Cell::Empty,
+                (true, _) => Cell::Number,
+                (_, true) => Cell::Stamp,
+                _ => Cell::Text,
+            });
         }
         let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
         let full: usize = rows.iter().map(|r| numbers(&r.1)).sum();
@@ -238,7 +259,18 @@ impl Dialect {
             .sum();
         let score = rows.len() as f64 / total as f64 * full as f64 / cells_seen.max(1) as f64
             * (1.0 - 0.5 / n as f64);
-        let (names, named) = names(lines, &split, first, n, delimiter);
+        let open = kinds.last() == Some(&Cell::Empty);
+        let Names {
+            names,
+            named,
+            unused,
+        } = names(lines, &split, first, n, delimiter, open);
+        // what stands behind a delimiter at the end of each line
+        if let Some(last) = kinds.last_mut().filter(|_| open && named)
+            && names.last() == Some(&n.to_string())
+        {
+            *last = Cell::Text;
+        }
         let special = |l: &&[u8]| l.iter().any(|b| matches!(b, b'"' | b'\'' | b'[' | b'('));
         let plain = !comma
             && delimiter != b' '
@@ -252,26 +284,49 @@ impl Dialect {
                 names,
                 cells: kinds,
                 head: first,
-                named,
+                unused,
             },
         ))
     }
 }
 
-/// Names of `n` columns from the line before the first row `first`, be it a comment or not. A list in a
-/// cell stands under one name.
+/// Names of columns.
+struct Names {
+    names: Vec<String>,
+    /// whether they stand in the file
+    named: bool,
+    /// names that are not of so many columns
+    unused: Option<String>,
+}
+
+/// Characters of a line that are shown.
+const SHOWN: usize = 80;
+
+/// Names of `n` columns from the line before the first row `first`, be it a comment or not, with the units where they
+/// have a line of their own. A list in a cell stands under one name; where the lines are `open`, nothing stands in the
+/// last cell.
 fn names(
     lines: &[&[u8]],
     split: &[(usize, Vec<Vec<u8>>)],
     first: usize,
     n: usize,
     delimiter: u8,
-) -> (Vec<String>, bool) {
+    open: bool,
+) -> Names {
     let text = |c: &[u8]| {
         let t = String::from_utf8_lossy(c);
         t.trim().trim_matches(['"', '\'']).trim().to_string()
     };
-    let numbered = || ((1..=n).map(|k| k.to_string()).collect(), false);
+    let numbered = |unused: Option<String>| Names {
+        names: (1..=n).map(|k| k.to_string()).collect(),
+        named: false,
+        unused,
+    };
+    let named = |names: Vec<String>| Names {
+        names: unique(names),
+        named: true,
+        unused: None,
+    };
     // header cells without regard to brackets, which are part of names
     let plain = |line: &[u8], delimiter: u8| -> Vec<String> {
         match delimiter {
@@ -280,11 +335,12 @@ fn names(
                 .filter(|c| !c.is_empty())
                 .map(text)
                 .collect(),
-            d => line.split(|b| *b == d).map(text).collect(),
+            d => unquoted(line, d).into_iter().map(text).collect(),
         }
     };
     // the nearest line above that can be names; a comment only if it has as many words as there are columns
-    let mut found = Vec::new();
+    let mut found: Vec<String> = Vec::new();
+    let mut units: Option<Vec<String>> = None;
     for line in lines[..first].iter().rev() {
         let line = line.trim_ascii();
         if line.is_empty() {
@@ -292,6 +348,15 @@ fn names(
         }
         if !idle(line) {
             found = plain(line, delimiter);
+            // a row of another number of cells
+            if 2 * found.iter().filter(|c| c.parse::<f64>().is_ok()).count() > found.len() {
+                found.clear();
+                continue;
+            }
+            if units.is_none() && all_units(&found) {
+                units = Some(std::mem::take(&mut found));
+                continue;
+            }
             break;
         }
         let marks = line.iter().take_while(|c| matches!(c, b'#' | b'%' | b'/'));
@@ -305,29 +370,53 @@ fn names(
             break;
         }
     }
+    let units = match units {
+        // no names above them: the columns are called so
+        Some(units) if found.len() != units.len() => {
+            found = units;
+            None
+        }
+        units => units,
+    };
+    for (name, unit) in found.iter_mut().zip(units.iter().flatten()) {
+        let unit = bare(unit);
+        if !unit.is_empty() && unit != "-" && !name.contains(['[', '(']) {
+            *name = format!("{name} [{unit}]");
+        }
+    }
     if found.is_empty() {
-        return numbered();
+        return numbered(None);
+    }
+    if open && found.len() + 1 == n {
+        found.push(String::new());
     }
     // a comma at the end of each line makes a column without name
     while found.len() > n && found.last().is_some_and(String::is_empty) {
         found.pop();
     }
     if found.iter().all(|c| c.parse::<f64>().is_ok()) {
-        return numbered();
+        return numbered(None);
     }
     if found.len() == n {
-        return (unique(found), true);
+        return named(found);
     }
+    let mut head = found.join(", ");
+    if let Some((at, _)) = head.char_indices().nth(SHOWN) {
+        head.truncate(at);
+        head.push('…');
+    }
+    let unused =
+        (found.len() > 1).then(|| format!("{} names for {n} columns ({head})", found.len()));
     if found.len() > n {
-        return numbered();
+        return numbered(unused);
     }
     // lists: how many cells each name stands over, from the first row as it is written
     let Some(row) = split.iter().find(|(i, r)| *i == first && r.len() == n) else {
-        return numbered();
+        return numbered(unused);
     };
     let widths = widths(lines[row.0], delimiter);
     if widths.len() != found.len() || widths.iter().sum::<usize>() != n {
-        return numbered();
+        return numbered(unused);
     }
     let mut out = Vec::new();
     for (name, width) in found.iter().zip(widths) {
@@ -336,7 +425,30 @@ fn names(
             w => out.extend((0..w).map(|k| format!("{name}[{k}]"))),
         }
     }
-    (unique(out), true)
+    named(out)
+}
+
+/// A unit without its brackets.
+fn bare(cell: &str) -> &str {
+    cell.trim_matches(['[', ']', '(', ')']).trim()
+}
+
+/// Whether all cells of a line are units or nothing, and more than one is a unit.
+fn all_units(cells: &[String]) -> bool {
+    let known = |c: &&String| unit(bare(c)).is_some();
+    let none = |c: &&String| matches!(bare(c), "" | "-");
+    let units = cells.iter().filter(known).count();
+    units > 1 && cells.iter().all(|c| known(&c) || none(&c))
+}
+
+/// The cells of a line, quoted ones whole.
+fn unquoted(line: &[u8], delimiter: u8) -> Vec<&[u8]> {
+    let mut quoted = false;
+    line.split(|b| {
+        quoted ^= *b == b'"';
+        *b == delimiter && !quoted
+    })
+    .collect()
 }
 
 /// Number of cells that each cell of a line becomes when its list is laid open.

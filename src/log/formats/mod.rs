@@ -283,7 +283,9 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
     if head.starts_with(b"PK\x03\x04") || head.starts_with(b"\x93NUMPY") {
         return Ok(Format::Npz);
     }
-    if head.starts_with(b"MATLAB 5.0") || matches!(head.get(126..128), Some(b"IM" | b"MI")) {
+    // a text of its own, then version 1 and the order of bytes
+    let matlab = matches!(head.get(124..128), Some(b"\x00\x01IM" | b"\x01\x00MI"));
+    if head.starts_with(b"MATLAB 5.0") || matlab {
         return Ok(Format::Mat);
     }
     if head.starts_with(b"MATLAB 7.3") || head.starts_with(b"\x89HDF") {
@@ -296,6 +298,9 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
     }
     if head.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) || head.starts_with(&[0x1f, 0x8b]) {
         return refuse("the whole file is compressed; unpack it first");
+    }
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return refuse("it is text in UTF-16; save it as UTF-8 (or plain CSV)");
     }
     if head.iter().filter(|b| **b == 0).count() > head.len() / 8 {
         return refuse(

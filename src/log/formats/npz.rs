@@ -5,7 +5,7 @@
 
 use super::arrays::{self, Array};
 use super::bytes::{Bytes, Kind};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Table;
 use std::path::Path;
 
@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path) -> Result<Table> {
         ));
     }
     let mut list = Bytes::new(data.get(at as usize..).unwrap_or_default(), true);
-    let mut found = Vec::new();
+    let (mut found, mut left) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let (name, method, packed, full, head) = entry(&mut list).ok_or_else(broken)?;
         let Some(short) = name.strip_suffix(".npy") else {
@@ -58,11 +58,24 @@ pub(super) fn read(path: &Path) -> Result<Table> {
         };
         match npy(&unpacked, short) {
             Ok(array) => found.push(array),
-            Err(m) if m.contains("not numbers") || m.contains("dimensions") => {}
+            Err(m) if m.contains("not numbers") || m.contains("dimensions") => {
+                left.push(format!("{short} ({m})"));
+            }
             Err(m) => return Err(fail(m)),
         }
     }
-    arrays::table(found, path)
+    let mut table = arrays::table(found, path)?;
+    if !left.is_empty() {
+        table.warnings.push(Warning::new(
+            WarningKind::ColumnsIgnored,
+            path.display().to_string(),
+            format!(
+                "arrays that are no columns were left out: {}",
+                left.join(", ")
+            ),
+        ));
+    }
+    Ok(table)
 }
 
 /// One entry of the directory: name, method, packed and full size, where the file stands.

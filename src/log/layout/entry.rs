@@ -62,6 +62,11 @@ impl Layout {
         if scale.iter().chain(&gear).any(|s| *s == 0.0) {
             return Err(format!("columns.{name}: scale and gear cannot be 0"));
         }
+        if let Some(s) = scale.iter().find(|s| **s < 0.0) {
+            return Err(format!(
+                "columns.{name}.scale is {s}; it is positive: state sign = -1"
+            ));
+        }
         if let Some(d) = delay.iter().find(|d| d.abs() > 1.0) {
             return Err(format!("columns.{name}.delay is {d} s; is it in seconds?"));
         }
@@ -74,7 +79,9 @@ impl Layout {
                     ));
                 }
                 Some(("A" | "mA", f)) => {
-                    self.currents |= name == "tau" && !table.contains_key("scale");
+                    let gains = table.contains_key("scale");
+                    self.currents |= name == "tau" && !gains;
+                    self.gains |= name == "tau" && gains;
                     f
                 }
                 Some((_, f)) => f,

@@ -1,11 +1,12 @@
 //! What is wrong with the channels of a log: dropped, stuck and saturated values, units, periods.
 
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, counted};
 use crate::log::clock::Clock;
 use crate::log::resample::fill;
 use crate::log::{Record, channels};
 use crate::robot::Joint;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Shortest period of a motion, in samples.
 const SHORTEST: f64 = 4.0;
@@ -13,16 +14,19 @@ const SHORTEST: f64 = 4.0;
 /// Longest period of a motion, in lengths of the record.
 const LONGEST: f64 = 1e3;
 
+/// Most that a channel moved in time misses at its ends, s.
+const ENDS: f64 = 0.2;
+
 impl Record {
     /// Interpolates dropped values, marks them, and names their channels.
     pub(super) fn fill_dropped(&mut self, clock: &Clock) -> Result<()> {
         let path = self.path.clone();
         let mut valid = std::mem::take(&mut self.valid);
-        let mut warnings = Vec::new();
-        for (name, order, column) in self.channels() {
-            let holes: Vec<usize> = (0..column.len())
-                .filter(|&i| !column[i].is_finite())
-                .collect();
+        let (mut warnings, mut ends, mut missing) = (Vec::new(), Vec::new(), 0);
+        let channels = self.channels();
+        let holes = |y: &[f64]| (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
+        let all: Vec<Vec<usize>> = channels.par_iter().map(|(.., c)| holes(c)).collect();
+        for ((name, order, column), holes) in channels.into_iter().zip(all) {
             let Some(&first) = holes.first() else {
                 continue;
             };
@@ -34,14 +38,38 @@ impl Record {
             for &i in &holes {
                 valid[i] = false;
             }
-            warnings.push(Warning::new(WarningKind::SamplesLeftOut,
+            let n = column.len();
+            let head = holes
+                .iter()
+                .enumerate()
+                .take_while(|(k, i)| *k == **i)
+                .count();
+            let tail = holes.iter().rev().enumerate();
+            let tail = tail.take_while(|(k, i)| **i + 1 + *k == n).count();
+            let at_ends = head + tail == holes.len() && holes.len() as f64 * clock.step < ENDS;
+            if at_ends {
+                ends.push(name);
+                missing = missing.max(holes.len());
+                continue;
+            }
+            warnings.push(Warning::new(
+                WarningKind::SamplesLeftOut,
                 format!("{}: {name}", path.display()),
                 format!(
-                    "{} of {} values were dropped, the first at {:.4} s; interpolated for the filters and \
-                     left out of the fit",
+                    "{} of {n} values were dropped, the first at {:.4} s; interpolated for the filters and left out of \
+                     the fit",
                     holes.len(),
-                    column.len(),
                     clock.t[first]
+                ),
+            ));
+        }
+        if !ends.is_empty() {
+            warnings.push(Warning::new(
+                WarningKind::SamplesLeftOut,
+                format!("{}: {}", path.display(), ends.join(", ")),
+                format!(
+                    "no more than {} at the ends of the record missing, as a stated `delay` leaves them; left out of the fit",
+                    counted(missing, "value")
                 ),
             ));
         }
@@ -82,33 +110,13 @@ impl Record {
         let any: Vec<bool> = (0..self.valid.len())
             .map(|i| moving.iter().any(|m| m[i]))
             .collect();
-        for (j, joint) in joints.iter().enumerate() {
-            self.warnings
-                .extend(channels::position_unit(joint, &self.q[j]));
-            let name = format!("{subject}: tau{}", j + 1);
-            if let Some(tau) = self.tau.get(j) {
-                if let Some((count, level)) =
-                    channels::saturated(tau, joint.limits.effort, &mut self.valid)
-                {
-                    self.warnings.push(Warning::new(WarningKind::SamplesLeftOut,
-                        name.clone(),
-                        format!(
-                            "it stands at {level:.6} for {count} samples as a saturated channel does; they \
-                             were left out of the fit"
-                        ),
-                    ));
-                }
-                if let Some(run) = channels::stuck(tau, step, &any, &mut self.valid) {
-                    self.warnings.push(stuck(name, run, step));
-                }
-            }
-            // an encoder that stands still is stuck if the command goes on
-            if let Some(qref) = &self.qref {
-                let (q, qref) = (&self.q[j], &qref[j]);
-                if let Some(run) = channels::stuck_encoder(q, qref, step, &mut self.valid) {
-                    self.warnings
-                        .push(stuck(format!("{subject}: q{}", j + 1), run, step));
-                }
+        let check = |(j, joint): (usize, &&Joint)| self.check_actuator(j, joint, &any);
+        let found: Vec<(Vec<Warning>, Vec<Range<usize>>)> =
+            joints.par_iter().enumerate().map(check).collect();
+        for (warnings, out) in found {
+            self.warnings.extend(warnings);
+            for range in out {
+                self.valid[range].fill(false);
             }
         }
         let bad = self.valid.iter().filter(|v| !**v).count();
@@ -124,6 +132,44 @@ impl Record {
             ));
         }
         Ok(())
+    }
+
+    /// What is wrong with the channels of actuator `j`, and which samples are left out for it; `moving` says when any moves.
+    fn check_actuator(
+        &self,
+        j: usize,
+        joint: &Joint,
+        moving: &[bool],
+    ) -> (Vec<Warning>, Vec<Range<usize>>) {
+        let subject = self.path.display();
+        let (q, step) = (&self.q[j], self.step);
+        let mut warnings: Vec<Warning> = channels::position_unit(joint, q).into_iter().collect();
+        let mut out = Vec::new();
+        if let Some(tau) = self.tau.get(j) {
+            let name = format!("{subject}: tau{}", j + 1);
+            if let Some(clipped) = channels::saturated(tau, joint.limits.effort) {
+                let message = format!(
+                    "it stands at {:.6} for {} samples as a saturated channel does; they were left out of the fit",
+                    clipped.level, clipped.count
+                );
+                warnings.push(Warning::new(
+                    WarningKind::SamplesLeftOut,
+                    name.clone(),
+                    message,
+                ));
+                out.extend(clipped.at);
+            }
+            let runs = channels::stuck(tau, step, moving);
+            warnings.extend(stuck(name, &runs, step));
+            out.extend(runs);
+        }
+        // an encoder that stands still is stuck if the command goes on
+        if let Some(qref) = &self.qref {
+            let runs = channels::stuck_encoder(q, &qref[j], step);
+            warnings.extend(stuck(format!("{subject}: q{}", j + 1), &runs, step));
+            out.extend(runs);
+        }
+        (warnings, out)
     }
 
     /// A stated period that samples cannot resolve, or that is far longer than the record of
@@ -193,14 +239,17 @@ impl Record {
     }
 }
 
-fn stuck(name: String, (runs, samples, first): (usize, usize, usize), step: f64) -> Warning {
-    Warning::new(
+fn stuck(name: String, runs: &[Range<usize>], step: f64) -> Option<Warning> {
+    let first = runs.first()?.start;
+    let samples: usize = runs.iter().map(Range::len).sum();
+    Some(Warning::new(
         WarningKind::SamplesLeftOut,
         name,
         format!(
-            "it stands still {runs} times, {samples} samples in all, while the robot moves (first at \
+            "it stands still {} times, {samples} samples in all, while the robot moves (first at \
              {:.3} s): stuck or dropped; left out of the fit",
+            runs.len(),
             first as f64 * step
         ),
-    )
+    ))
 }

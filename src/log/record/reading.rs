@@ -130,9 +130,9 @@ impl Record {
                 still += 1;
                 return Ok(ControlFlow::Continue(()));
             }
-            let mut record = Self::of_table(table, path, plant, purpose, period, [None; 2])?;
-            // what only a diagnosis asks for
-            record.written = None;
+            let (mut record, clock) =
+                Self::repaired(table, path, plant, purpose, period, [None; 2])?;
+            record.put_on_grid(&clock)?;
             record.name = format!("{}[{parts}]", record.name);
             let next = each(record)?;
             enough = next.is_break();
@@ -240,6 +240,14 @@ fn translate(
         return Err(Error::file(path, "", message));
     }
     let mut out = layout.apply(&mut table, &joints, path)?;
+    if layout.gains {
+        out.warnings.push(Warning::new(
+            WarningKind::DriveGainAssumed,
+            &subject,
+            "tau is motor currents times the gains of `scale`: torques, and what is identified from them, are as good as \
+             those gains, whatever their ± says",
+        ));
+    }
     for what in &layout.without {
         let weightless = plant.robot().gravity.norm() == 0.0;
         match what.as_str() {

@@ -7,6 +7,8 @@ use std::path::Path;
 
 /// A position (rad or m) beyond this is the way in which a file says that there is no limit.
 const NO_POSITION: f64 = 1e6;
+/// A velocity or an effort from this on, and what a file is given where there is no limit.
+pub(crate) const NO_LIMIT: f64 = 1e9;
 /// A limit of velocity or effort below this is a zero.
 const NO_MOTION: f64 = 1e-9;
 
@@ -82,7 +84,7 @@ pub(super) fn of_joint(
             Some(value) if value < 0.0 => Err(format!(
                 "its {name} limit is {value}; correct the sign or state `{name}` in robot.toml"
             )),
-            Some(value) if value > NO_MOTION => Ok(Some(value)),
+            Some(value) if value > NO_MOTION && value < NO_LIMIT => Ok(Some(value)),
             _ => Ok(None),
         },
     };
@@ -114,7 +116,7 @@ pub(super) fn of_joint(
             WarningKind::LimitsMissing,
             &what,
             format!(
-                "no limit of {} in the URDF (absent or 0); taken as unlimited, \
+                "no limit of {} in the URDF (absent, 0, or {NO_LIMIT} and more); taken as unlimited, \
                  state it in robot.toml",
                 missing.join(", ")
             ),

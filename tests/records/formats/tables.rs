@@ -7,7 +7,7 @@ fn tables_of_any_layout_are_read_by_their_names() {
     let dir = folder();
     let dir = dir.path();
     type Row = fn(f64, [f64; 2], [f64; 2]) -> String;
-    let layouts: [(&str, &str, Row, [usize; 2]); 12] = [
+    let layouts: [(&str, &str, Row, [usize; 2]); 18] = [
         (
             "semicolons and decimal commas",
             "time;q1;q2;tau1;tau2\n",
@@ -18,6 +18,61 @@ fn tables_of_any_layout_are_read_by_their_names() {
             "tabs",
             "% a comment\ntime_ms\tpos_1\tpos_2\ttorque_1\ttorque_2\n",
             |t, q, w| format!("{}\t{}\t{}\t{}\t{}", 1e3 * t, q[0], q[1], w[0], w[1]),
+            [0, 1],
+        ),
+        (
+            "tabs at the end of each line",
+            "t\tq1\tq2\ttau1\ttau2\t\n",
+            |t, q, w| format!("{t}\t{}\t{}\t{}\t{}\t", q[0], q[1], w[0], w[1]),
+            [0, 1],
+        ),
+        (
+            "remarks that come late",
+            "t,q1,q2,tau1,tau2,message\n",
+            |t, q, w| {
+                let remark = if t < 1.2 { "" } else { "running" };
+                format!("{t},{},{},{},{},{remark}", q[0], q[1], w[0], w[1])
+            },
+            [0, 1],
+        ),
+        (
+            "units under the names",
+            "time,position_1,position_2,torque_1,torque_2\nms,rad,deg,N m,mNm\n",
+            |t, q, w| {
+                let (second, last) = (q[1] * 180.0 / PI, 1e3 * w[1]);
+                format!("{},{},{second},{},{last}", 1e3 * t, q[0], w[0])
+            },
+            [0, 1],
+        ),
+        (
+            "delimiters in quoted names",
+            "t,\"position, joint 1\",\"position, joint 2\",\"torque, joint 1\",\"torque, joint 2\"\n",
+            |t, q, w| format!("{t},{},{},{},{}", q[0], q[1], w[0], w[1]),
+            [0, 1],
+        ),
+        (
+            "stamps west of Greenwich",
+            "date,q1,q2,tau1,tau2\n",
+            |t, q, w| {
+                let s = 10.0 + t;
+                format!(
+                    "2020-01-22T12:59:{s:09.6}-05:00,{},{},{},{}",
+                    q[0], q[1], w[0], w[1]
+                )
+            },
+            [0, 1],
+        ),
+        (
+            "afternoons",
+            "time,q1,q2,tau1,tau2\n",
+            |t, q, w| {
+                // over noon
+                let (hour, half, s) = match t < 1.0 {
+                    true => ("11:59", "AM", 59.0 + t),
+                    false => ("12:00", "PM", t - 1.0),
+                };
+                format!("{hour}:{s:09.6} {half},{},{},{},{}", q[0], q[1], w[0], w[1])
+            },
             [0, 1],
         ),
         (
@@ -159,7 +214,7 @@ fn a_short_file_says_what_was_left_out() {
         .unwrap_err()
         .to_string();
     for said in [read, looked] {
-        for part in ["log.txt", "1 rows are too few", "line 3", "q2", "oops"] {
+        for part in ["log.txt", "1 row is too few", "line 3", "q2", "oops"] {
             assert!(said.contains(part), "{part}: {said}");
         }
     }
@@ -251,6 +306,38 @@ fn an_experiment_states_its_columns() {
     }
 }
 
+/// Names that are not used are said to be so, and stamps of no known kind.
+#[test]
+fn names_that_are_not_used_are_named() {
+    let dir = folder();
+    let dir = dir.path();
+    let row = |t: f64, q: [f64; 2], w: [f64; 2]| format!("{t},{},{},{},{}", q[0], q[1], w[0], w[1]);
+    let columns = "log = \"log.txt\"\n[record.columns]\ntime = 1\nq = [2, 3]\ntau = [4, 5]";
+    table(dir, "t,q1,q2,tau1\n", row);
+    let r = read(dir, columns).unwrap();
+    holds(&r, [0, 1], 1e-9, "a short header");
+    let said = |r: &Record, word: &str| r.warnings.iter().any(|w| w.message.contains(word));
+    assert!(said(&r, "4 names for 5 columns"), "{:?}", r.warnings);
+    // a first row that is cut off hides no names
+    table(dir, "t,q1,q2,tau1,tau2\n0.5,0.1\n", row);
+    let r = read(dir, "log = \"log.txt\"").unwrap();
+    holds(&r, [0, 1], 1e-9, "a short first row");
+    table(dir, "t,q1,q2,tau1,tau2\n", |t, q, w| {
+        format!("tick {t},{},{},{},{}", q[0], q[1], w[0], w[1])
+    });
+    let named = "log = \"log.txt\"\n[record.columns]\ntime = { rate = 100 }\nq = [\"q1\", \"q2\"]\ntau = [\"tau1\", \"tau2\"]";
+    let r = read(dir, named).unwrap();
+    assert!(said(&r, "called a time"), "{:?}", r.warnings);
+    // text that has two letters of a binary format in the place of its mark
+    let names = format!(
+        "t,q1,q2,tau1,tau2,{}IM\n",
+        "x".repeat(126 - "t,q1,q2,tau1,tau2,".len())
+    );
+    table(dir, &names, |t, q, w| format!("{},1", row(t, q, w)));
+    let r = read(dir, "log = \"log.txt\"").unwrap();
+    holds(&r, [0, 1], 1e-9, "IM at byte 126");
+}
+
 /// One file a quantity, on clocks of their own.
 #[test]
 fn files_with_a_quantity_each_are_one_record() {
@@ -267,4 +354,14 @@ fn files_with_a_quantity_each_are_one_record() {
     holds(&r, [0, 1], 1e-9, "two files");
     let e = error(dir, "log = \"log.txt\"");
     assert!(e.contains("no torques"), "{e}");
+    // a column of one of them that is empty takes nothing away
+    table(dir, "time,torque_1,torque_2,remark\n", |t, _, w| {
+        format!("{},{},{},", t + 1e-4, w[0], w[1])
+    });
+    std::fs::rename(dir.join("log.txt"), dir.join("torques.csv")).unwrap();
+    table(dir, "time,position_1,position_2\n", |t, q, _| {
+        format!("{t},{},{}", q[0], q[1])
+    });
+    let r = read(dir, "log = [\"log.txt\", \"torques.csv\"]").unwrap();
+    assert!(r.len() >= COUNT - 1, "{}", r.len());
 }
