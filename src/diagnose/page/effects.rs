@@ -29,8 +29,10 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
                 @if let Some(d) = f.decoys { (percent(d)) } @else { "–" }
                 div { small { @if let Some(u) = f.unsteady { "unsteady " (percent(u)) } } }
             },
-            values(f),
-            html! { @if f.same.is_empty() { "–" } @else { (f.same.join(", ").replace('_', " ")) } },
+            html! {
+                (values(f))
+                @if !f.same.is_empty() { div { small { "not told from " (f.same.join(", ").replace('_', " ")) } } }
+            },
         ]
     };
     let head = [
@@ -42,7 +44,6 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
         "visible",
         "decoys",
         "parameters (95 %)",
-        "not told from",
     ];
     let (set, rest): (Vec<&Finding>, Vec<&Finding>) = d.findings.iter().partition(|f| f.member);
     html! {
@@ -51,9 +52,9 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
             nominal model cannot absorb by other parameters; " strong { "decoys" } " the most that the effect explains of its own when it \
             is moved in time, over what it explains in place: near 100 % it is as good as any signal; " strong { "unsteady" } " \
             what coefficients of their own for every record would add to that, near 0 % where it is the same in all." }
-        (table(&head, &[1, 7, 8], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
+        (table(&head, &[1, 7], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
         @if !rest.is_empty() {
-            (details("Rivals: what else could stand in their place", table(&head, &[1, 7, 8],
+            (details("Rivals: what else could stand in their place", table(&head, &[1, 7],
                 &rest.iter().map(|f| row(f)).collect::<Vec<_>>())))
         }
     }

@@ -116,7 +116,7 @@ pub(super) fn of_joint(
             WarningKind::LimitsMissing,
             &what,
             format!(
-                "no limit of {} in the URDF (absent, 0, or {NO_LIMIT} and more); taken as unlimited, \
+                "no limit of {} in the URDF (absent, 0, or {NO_LIMIT:e} and more); taken as unlimited, \
                  state it in robot.toml",
                 missing.join(", ")
             ),

@@ -259,7 +259,7 @@ fn imperfect_urdfs_are_read_with_a_warning() {
                 "<limit lower=\"0\" upper=\"0\" velocity=\"0\" effort=\"0\"/>",
             ),
             "joint `shoulder`",
-            &["position, velocity, effort", "absent or 0"],
+            &["position, velocity, effort", "absent, 0"],
         ),
         (
             replaced("velocity=\"3\"", "velocity=\"0\""),
