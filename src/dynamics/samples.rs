@@ -20,6 +20,25 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// The samples with these numbers, in this order.
+    ///
+    /// # Panics
+    /// If there is no such sample.
+    pub fn select(&self, at: &[usize]) -> Self {
+        let rows = |x: &[f64]| -> Vec<f64> {
+            let rows = x.chunks_exact(self.count.max(1));
+            rows.flat_map(|row| at.iter().map(move |&i| row[i]))
+                .collect()
+        };
+        Samples {
+            dof: self.dof,
+            count: at.len(),
+            q: rows(&self.q),
+            qd: rows(&self.qd),
+            qdd: rows(&self.qdd),
+        }
+    }
+
     /// A motion at rest in zero, to be filled.
     pub fn zeros(dof: usize, count: usize) -> Self {
         let z = vec![0.0; dof * count];

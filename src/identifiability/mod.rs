@@ -207,7 +207,7 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
         }
     };
     let platform = match (plant.mechanism(), certified.mechanism) {
-        (Some(m), Some(c)) => Some(Platform::of(m, &motion, c)?),
+        (Some(m), Some(c)) => Some(Platform::of(m, &motion, c, trajectory.fourier.period)?),
         _ => None,
     };
     let unit_columns = all.unit_columns();

@@ -6,7 +6,10 @@ use crate::error::Result;
 use crate::mechanism::{
     Mechanism, MechanismCertificate, PoseKind, PosePeak, PoseUse, Segment, Task,
 };
-use crate::trajectory::{RATE, Space};
+use crate::trajectory::Space;
+
+/// Most samples of a period that are kept.
+const MOST: usize = 20_000;
 
 /// What the platform of a parallel robot does.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -18,7 +21,7 @@ pub struct Platform {
     pub names: Vec<String>,
     /// what the series of the trajectory move
     pub space: Space,
-    /// one period at [`RATE`], the end point left out
+    /// one period at [`RATE`](crate::trajectory::RATE), or as many samples as are kept, the end point left out
     pub motion: Samples,
     /// workspace box, actuators, passive joints, singularities and distances
     pub certificate: MechanismCertificate,
@@ -46,9 +49,16 @@ impl Platform {
         mechanism: &Mechanism,
         motion: &Samples,
         certificate: MechanismCertificate,
+        period: f64,
     ) -> Result<Self> {
         let space = mechanism.space();
-        let motion = mechanism.platform_motion(motion)?.into_owned();
+        // what is kept of each sample must not grow with a period of days
+        let each = motion.count.div_ceil(MOST).max(1);
+        let step = period / motion.count.max(1) as f64 * each as f64;
+        let some: Vec<usize> = (0..motion.count).step_by(each).collect();
+        let motion = mechanism
+            .platform_motion(&motion.select(&some))?
+            .into_owned();
         let mechanism = mechanism.platform();
         let pairs = mechanism.pairs();
         let n = motion.count;
@@ -84,7 +94,7 @@ impl Platform {
                 .sum()
         };
         let farthest = (0..n).max_by(|&a, &b| size(a).total_cmp(&size(b)));
-        let time = |s: usize| s as f64 / RATE;
+        let time = |s: usize| s as f64 * step;
         for (what, at) in [
             ("nearest to a singularity", nearest),
             ("farthest from home", farthest),

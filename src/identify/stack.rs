@@ -77,7 +77,7 @@ impl Stack {
             .par_iter()
             .map(|range| {
                 let inputs = p.filter.inputs(range.clone());
-                let part = select(motion, &inputs);
+                let part = motion.select(&inputs);
                 let w = plant.regressor_columns(&part)?;
                 let known = plant.known_torque(&part)?;
                 let outputs = range.len();
@@ -175,21 +175,5 @@ impl Stack {
         let predicted = self.predicted(pi);
         let pairs = self.measured.iter().zip(predicted);
         pairs.map(|(m, p)| m - p).collect()
-    }
-}
-
-/// The samples of these numbers.
-fn select(motion: &Samples, at: &[usize]) -> Samples {
-    let rows = |x: &[f64]| -> Vec<f64> {
-        x.chunks_exact(motion.count)
-            .flat_map(|row| at.iter().map(move |&i| row[i]))
-            .collect()
-    };
-    Samples {
-        dof: motion.dof,
-        count: at.len(),
-        q: rows(&motion.q),
-        qd: rows(&motion.qd),
-        qdd: rows(&motion.qdd),
     }
 }
