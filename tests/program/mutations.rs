@@ -207,7 +207,7 @@ const TARGETS: [(&str, &[&str]); 31] = [
 const FOREIGN: &[&str] = &[
     "log FILE --output o --force",
     "log FILE --robot arm.toml --output o --force",
-    "identify FILE --robot arm.toml --output o --force",
+    "condense FILE --robot arm.toml --cutoff 10 --output c.factor --force",
 ];
 
 /// Runs the program with a limit of memory and time; status (`None`: it was killed) and messages.
