@@ -6,6 +6,16 @@
 
 use std::path::{Path, PathBuf};
 
+/// Names for a message: the first of them, and nothing that a terminal obeys.
+pub(crate) fn listed(names: &[String]) -> String {
+    const SHOWN: usize = 200;
+    let all: String = names.join(",").escape_debug().collect();
+    match all.chars().count() > SHOWN {
+        true => format!("{}…", all.chars().take(SHOWN).collect::<String>()),
+        false => all,
+    }
+}
+
 /// `1 gap`, `3 gaps`.
 pub(crate) fn counted(n: usize, noun: &str) -> String {
     let plural = if n == 1 { "" } else { "s" };

@@ -45,14 +45,14 @@ pub struct Args {
 const FASTEST: f64 = 5.0;
 
 pub fn run(args: Args) -> Result<()> {
-    let (plant, trajectory, changed) = read(&args.robot, &args.trajectory)?;
-    let files = prepare_dir(&args.output, &["rehearsal.json"], args.force)?;
     if let Some(s) = args.speeds.iter().find(|s| **s > FASTEST) {
         return Err(Error::Argument(format!(
             "--speeds are shares of the designed speed, not percent: {s} is {:.0} %",
             100.0 * s
         )));
     }
+    let (plant, trajectory, changed) = read(&args.robot, &args.trajectory)?;
+    let files = prepare_dir(&args.output, &["rehearsal.json"], args.force)?;
     let found = rehearse(&plant, &trajectory, args.rate, &args.speeds)?;
     let all = plant.warnings().iter().chain(&changed);
     warn(&all.cloned().collect::<Vec<_>>());

@@ -224,14 +224,11 @@ impl Outline {
             let record = Record::read_as(&e.logs, &self.plant, e.purpose, e.period, &e.reading)?;
             self.finished(e, record)
         };
-        let mut records = self
+        let records = self
             .entries
             .par_iter()
             .map(one)
             .collect::<Result<Vec<_>>>()?;
-        for (record, e) in records.iter_mut().zip(&self.entries) {
-            record.warnings.extend(self.fitted_too(e));
-        }
         Ok(Experiment {
             path: self.path,
             spec: self.spec,
@@ -317,6 +314,7 @@ impl Outline {
         }
         let seen = pose_check::check(&self.plant, &record);
         record.warnings.extend(seen);
+        record.warnings.extend(self.fitted_too(planned));
         if let Some(atmosphere) = self.atmosphere {
             pressure::press(&mut record, &self.plant, atmosphere)?;
         }

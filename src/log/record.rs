@@ -4,13 +4,13 @@ mod checks;
 mod cut;
 mod reading;
 
-pub(crate) use cut::impossible;
+pub(crate) use cut::{impossible, unmeasured};
 pub(crate) use reading::Reading;
 
 use super::clock::{self, Clock};
 use super::resample::{Order, interpolate};
 use super::{Payload, Purpose, Record, Table};
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, listed};
 use crate::plant::Plant;
 use crate::robot::Joint;
 use rayon::prelude::*;
@@ -47,16 +47,6 @@ fn numbered(name: &str) -> Option<(&'static str, usize)> {
     (!digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()))
         .then(|| digits.parse().ok().map(|k| (group, k)))
         .flatten()
-}
-
-/// The names in the header for a message: the first of them, and nothing that a terminal obeys.
-fn header(names: &[String]) -> String {
-    const SHOWN: usize = 200;
-    let all: String = names.join(",").escape_debug().collect();
-    match all.chars().count() > SHOWN {
-        true => format!("{}…", all.chars().take(SHOWN).collect::<String>()),
-        false => all,
-    }
 }
 
 /// Where the columns of a group stand, one an actuator; `None` where there is none of them.
@@ -138,7 +128,7 @@ pub(super) fn check_names(table: &Table, joints: &[&Joint], path: &Path) -> Resu
         return error(format!(
             "{missing}; the header is `{}`, expected are t, q1 to q{n}, tau1 to tau{n}, and if recorded dq1…, \
              ddq1…, qref1…",
-            header(&table.names)
+            listed(&table.names)
         ));
     }
     for group in GROUPS {

@@ -2,13 +2,13 @@
 
 use super::claim::{Claim, Means};
 use super::file_name;
-use crate::error::{Error, Result, Warning, WarningKind, counted};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Table;
 use crate::log::channels;
 use crate::log::clock;
 use crate::log::formats::Format;
 use crate::log::layout::{Layout, Place, Time, time_unit};
-use crate::log::record::{impossible, too_few};
+use crate::log::record::{impossible, too_few, unmeasured};
 use crate::log::resample::{Order, fill, interpolate};
 use crate::median::median;
 use crate::plant::Plant;
@@ -146,11 +146,7 @@ impl Frame {
                 warnings.push(Warning::new(
                     WarningKind::SamplesLeftOut,
                     format!("{subject}: {}", table.names[k]),
-                    format!(
-                        "{} cannot have been measured, the first at row {row} ({:e}): dropped",
-                        counted(wrong.len(), "value"),
-                        y[at]
-                    ),
+                    unmeasured(wrong.len(), row, y[at]),
                 ));
             }
             wrong.iter().for_each(|&i| y[i] = f64::NAN);

@@ -34,6 +34,17 @@ pub(super) fn extent(frames: &[Frame], k: usize) -> [f64; 2] {
     })
 }
 
+/// A claim in another unit, which the limits of its joint tell: of a position, a velocity and an acceleration.
+fn restate(claim: &mut Claim, factor: f64, units: [&'static str; 3], name: &str) {
+    claim.scale *= factor;
+    claim.unit = Some(match claim.means {
+        Means::Velocity => units[1],
+        Means::Acceleration => units[2],
+        _ => units[0],
+    });
+    claim.evidence += &format!("; {name}, by the limits of the joint");
+}
+
 /// Tests the claimed positions of each joint; where they fit in degrees and not as they are stated, they are degrees.
 pub(super) fn examine(
     frames: &[Frame],
@@ -51,25 +62,22 @@ pub(super) fn examine(
         let [low, high] = extent(frames, k);
         let f = claims[k].factor() * more;
         let joint = claims[k].at.and_then(|j| joints.get(j))?;
-        let turns = joint.motion == Motion::Revolute || more == 1.0;
-        Some(turns && fits(joint, (low * f).min(high * f), (low * f).max(high * f)))
+        Some(fits(
+            joint,
+            (low * f).min(high * f),
+            (low * f).max(high * f),
+        ))
     };
-    let far = columns
-        .iter()
-        .copied()
-        .filter(|&k| within(claims, k, 1.0) == Some(false))
-        .collect::<Vec<_>>();
-    if far.is_empty() {
-        return;
-    }
+    let moves = |claim: &Claim, motion: Motion| {
+        let joint = claim.at.and_then(|j| joints.get(j));
+        joint.is_some_and(|j| j.motion == motion)
+    };
+    let mut far = columns.clone();
+    far.retain(|&k| within(claims, k, 1.0) == Some(false));
     // a joint that slides and fits its limits in millimetres
     for &k in &far {
-        let [low, high] = extent(frames, k);
-        let slides = claims[k].at.and_then(|j| joints.get(j));
-        let slides = slides.filter(|j| j.motion == Motion::Prismatic);
-        let f = 1e-3 * claims[k].factor();
-        let (low, high) = (low * f, high * f);
-        if slides.is_none_or(|joint| !fits(joint, low.min(high), low.max(high))) {
+        let slides = moves(&claims[k], Motion::Prismatic);
+        if !slides || within(claims, k, 1e-3) != Some(true) {
             continue;
         }
         warnings.push(Warning::new(
@@ -80,41 +88,23 @@ pub(super) fn examine(
                 claims[k].joint.clone().unwrap_or_default()
             ),
         ));
-        for (l, claim) in claims.iter_mut().enumerate() {
-            if l == k || claim.of == Some(k) && claim.means != Means::Command {
-                claim.scale *= 1e-3;
-                claim.unit = Some(match claim.means {
-                    Means::Velocity => "mm/s",
-                    Means::Acceleration => "mm/s^2",
-                    _ => "mm",
-                });
-                let why = "; millimetres, by the limits of the joint";
-                claim.evidence.push_str(why);
-            }
+        let derived = |c: &Claim| c.of == Some(k) && c.means != Means::Command;
+        for (_, c) in (claims.iter_mut().enumerate()).filter(|(l, c)| *l == k || derived(c)) {
+            restate(c, 1e-3, ["mm", "mm/s", "mm/s^2"], "millimetres");
         }
     }
-    let far = far.into_iter();
-    let far: Vec<usize> = far
-        .filter(|&k| within(claims, k, 1.0) == Some(false))
-        .collect();
+    far.retain(|&k| within(claims, k, 1.0) == Some(false));
     if far.is_empty() {
         return;
     }
     let turns = |k: &usize| {
         let [low, high] = extent(frames, *k);
-        let revolute = claims[*k]
-            .at
-            .and_then(|j| joints.get(j))
-            .is_some_and(|j| j.motion == Motion::Revolute);
-        revolute && low.abs().max(high.abs()) * claims[*k].scale > TURN
+        let large = low.abs().max(high.abs()) * claims[*k].scale > TURN;
+        moves(&claims[*k], Motion::Revolute) && large
     };
     let all = far.iter().any(turns)
         && columns.iter().all(|&k| {
-            within(claims, k, PI / 180.0) == Some(true)
-                || claims[k]
-                    .at
-                    .and_then(|j| joints.get(j))
-                    .is_some_and(|j| j.motion == Motion::Prismatic)
+            within(claims, k, PI / 180.0) == Some(true) || moves(&claims[k], Motion::Prismatic)
         });
     let [low, high] = extent(frames, far[0]);
     if all {
@@ -127,25 +117,11 @@ pub(super) fn examine(
                 claims[far[0]].joint.clone().unwrap_or_default()
             ),
         ));
-        #[allow(clippy::needless_range_loop)]
-        for k in 0..claims.len() {
-            let angle = columns.contains(&k)
-                || claims[k].of.is_some_and(|p| columns.contains(&p))
-                    && claims[k].means != Means::Command;
-            let turns = claims[k]
-                .at
-                .and_then(|j| joints.get(j))
-                .is_some_and(|j| j.motion == Motion::Revolute);
-            if angle && turns {
-                claims[k].scale *= PI / 180.0;
-                claims[k].unit = Some(match claims[k].means {
-                    Means::Velocity => "deg/s",
-                    Means::Acceleration => "deg/s^2",
-                    _ => "deg",
-                });
-                claims[k]
-                    .evidence
-                    .push_str("; degrees, by the limits of the joint");
+        let derived =
+            |c: &Claim| c.of.is_some_and(|p| columns.contains(&p)) && c.means != Means::Command;
+        for (k, c) in claims.iter_mut().enumerate() {
+            if (columns.contains(&k) || derived(c)) && moves(c, Motion::Revolute) {
+                restate(c, PI / 180.0, ["deg", "deg/s", "deg/s^2"], "degrees");
             }
         }
         return;

@@ -1,6 +1,7 @@
 //! How a text file of cells is laid out, found out from its first lines: delimiter, decimal comma, names,
 //! lists in cells, columns of texts and of stamps.
 
+use crate::error::listed;
 use crate::log::number;
 use crate::log::unit::unit;
 
@@ -299,9 +300,6 @@ struct Names {
     unused: Option<String>,
 }
 
-/// Characters of a line that are shown.
-const SHOWN: usize = 80;
-
 /// Names of `n` columns from the line before the first row `first`, be it a comment or not, with the units where they
 /// have a line of their own. A list in a cell stands under one name; where the lines are `open`, nothing stands in the
 /// last cell.
@@ -400,13 +398,8 @@ fn names(
     if found.len() == n {
         return named(found);
     }
-    let mut head = found.join(", ");
-    if let Some((at, _)) = head.char_indices().nth(SHOWN) {
-        head.truncate(at);
-        head.push('…');
-    }
-    let unused =
-        (found.len() > 1).then(|| format!("{} names for {n} columns ({head})", found.len()));
+    let unused = (found.len() > 1)
+        .then(|| format!("{} names for {n} columns ({})", found.len(), listed(&found)));
     if found.len() > n {
         return numbered(unused);
     }

@@ -95,6 +95,14 @@ pub(crate) fn impossible(y: &[f64]) -> Vec<usize> {
     }
 }
 
+/// That so many values are impossible, the first in this row.
+pub(crate) fn unmeasured(count: usize, row: usize, value: f64) -> String {
+    format!(
+        "{} cannot have been measured, the first at row {row} ({value:e}): dropped",
+        counted(count, "value")
+    )
+}
+
 fn far_ones(y: &[f64]) -> Vec<usize> {
     let mut sorted: Vec<f64> = y.iter().copied().filter(|x| x.is_finite()).collect();
     let n = sorted.len();
@@ -137,10 +145,7 @@ impl Record {
             warnings.push(Warning::new(
                 WarningKind::SamplesLeftOut,
                 format!("{path}: {name}"),
-                format!(
-                    "{} cannot have been measured, the first at row {row} ({value:e}): dropped",
-                    counted(wrong.len(), "value")
-                ),
+                unmeasured(wrong.len(), row, value),
             ));
         }
         self.warnings.extend(warnings);
