@@ -26,6 +26,8 @@ use std::time::Instant;
 const PART: usize = 250_000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // as the program does
+    excite::heap::share();
     let words: Vec<String> = std::env::args().skip(1).collect();
     // `cargo bench` hands over `--bench`; without it (`cargo test --benches`) little will do
     let whole = words.iter().any(|a| a == "--bench");

@@ -87,6 +87,8 @@ mod dot;
 pub mod dynamics;
 mod error;
 pub mod export;
+#[doc(hidden)]
+pub mod heap;
 pub mod identifiability;
 pub mod identify;
 pub mod load;

@@ -8,7 +8,7 @@ use super::judge::Errors;
 use super::model::Model;
 use super::open::Opened;
 use super::result::{GroupResult, RowResult};
-use crate::error::{Error, Result, Warning, WarningKind, number};
+use crate::error::{Error, Result, Warning, WarningKind, agreeing, number};
 use faer::Mat;
 
 /// Warnings of the robot and of the files. What a calibration does not use is not worth a word.
@@ -120,9 +120,8 @@ pub(super) fn unreached(
         WarningKind::RowsLeftOut,
         file.clone(),
         format!(
-            "{} rows have joint readings that no pose of this assembly mode gives; they were left out, the first in \
-             line {}",
-            lost.len(),
+            "{} joint readings that no pose of this assembly mode gives: left out, the first in line {}",
+            agreeing(lost.len(), "row has", "rows have"),
             row.line
         ),
     ));

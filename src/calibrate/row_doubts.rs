@@ -1,7 +1,7 @@
 //! What looks wrong about a file of readings as a whole.
 
 use super::row::{Row, Source, Value};
-use crate::error::{Error, Result, Warning, WarningKind, number};
+use crate::error::{Error, Result, Warning, WarningKind, agreeing, number};
 use crate::median::median;
 
 /// Joint angles beyond this many radians are suspected to be degrees.
@@ -64,9 +64,12 @@ impl Tally {
             warn(
                 WarningKind::RowsLeftOut,
                 format!(
-                    "{} points of the target are seen where it has none, by more than five standard deviations; \
-                     they were left out",
-                    self.mistaken
+                    "{} seen where it has none, by more than five standard deviations: left out",
+                    agreeing(
+                        self.mistaken,
+                        "point of the target is",
+                        "points of the target are"
+                    )
                 ),
             );
         }

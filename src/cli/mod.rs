@@ -66,6 +66,7 @@ enum Command {
 
 /// Runs the program.
 pub fn main() -> ExitCode {
+    excite::heap::share();
     ExitCode::from(run(std::env::args_os()))
 }
 

@@ -11,7 +11,7 @@
 //! | a jump ahead by far more than the log is long | the later stamps are moved back, so that a gap of ten steps is left |
 //! | a gap | interpolated over so that filters run through, but marked as not measured |
 
-use crate::error::{Warning, WarningKind, counted};
+use crate::error::{Warning, WarningKind, agreeing, counted};
 use crate::median::median;
 
 /// Stamps after repair.
@@ -316,7 +316,7 @@ impl<'a> Scan<'a> {
 fn more(count: usize) -> String {
     match count {
         1 => String::new(),
-        n => format!(" (and {} times more)", n - 1),
+        n => format!(" (and {} more)", agreeing(n - 1, "time", "times")),
     }
 }
 
@@ -328,8 +328,8 @@ impl Found {
             warn(
                 WarningKind::RowsLeftOut,
                 format!(
-                    "{} rows have no time stamp and were left out, the first is row {}",
-                    self.lost,
+                    "{} no time stamp: left out, the first is row {}",
+                    agreeing(self.lost, "row has", "rows have"),
                     first + 1
                 ),
             );
@@ -338,9 +338,8 @@ impl Found {
             warn(
                 WarningKind::RowsLeftOut,
                 format!(
-                    "{} time stamps are far from those around them and their rows were left out, the first at row {} \
-                     ({x:e} s)",
-                    self.wrong.len(),
+                    "{} far from those around; left out with all of the row, the first at row {} ({x:e} s)",
+                    agreeing(self.wrong.len(), "time stamp is", "time stamps are"),
                     row + 1
                 ),
             );
@@ -370,8 +369,8 @@ impl Found {
             warn(
                 WarningKind::RowsLeftOut,
                 format!(
-                    "{} time stamps repeat the one before; those rows were left out",
-                    self.twice
+                    "{} the one before: left out with all of the row",
+                    agreeing(self.twice, "time stamp repeats", "time stamps repeat")
                 ),
             );
         }
@@ -379,8 +378,8 @@ impl Found {
             warn(
                 WarningKind::RowsLeftOut,
                 format!(
-                    "{} time stamps are earlier than the one before; those rows were left out",
-                    self.back
+                    "{} earlier than the one before: left out with all of the row",
+                    agreeing(self.back, "time stamp is", "time stamps are")
                 ),
             );
         }

@@ -177,6 +177,27 @@ fn idle(word: &str) -> bool {
     )
 }
 
+/// A name as the header has it, where a number was added because it stands there more than once.
+pub(crate) fn as_written<'n>(name: &'n str, all: &[String]) -> &'n str {
+    let Some((first, number)) = name.rsplit_once('#') else {
+        return name;
+    };
+    let added = number.parse::<usize>().is_ok_and(|n| n > 1) && all.iter().any(|n| n == first);
+    if added { first } else { name }
+}
+
+/// Names that stand in the header more than once.
+pub(crate) fn repeated(all: &[String]) -> Vec<&str> {
+    let mut out: Vec<&str> = Vec::new();
+    for name in all {
+        let written = as_written(name, all);
+        if written != name && !out.contains(&written) {
+            out.push(written);
+        }
+    }
+    out
+}
+
 /// Whether a name is one of a time.
 fn time(name: &str) -> Option<Option<&'static str>> {
     // of a path or of a field of a structure, its last part

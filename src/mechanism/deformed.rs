@@ -7,7 +7,8 @@
 //! ```
 //!
 //! The bodies of a leg feel its length and its angles alone, so the tree stays as it is. Changes are central
-//! differences; `x'` is found by Newton's method.
+//! differences, and `x'` is the first step of Newton's method from the nominal pose: what the second would add is even in the
+//! step, and the difference does not have it.
 
 use super::dimensions::LEG;
 use super::{Mechanism, Source};
@@ -17,8 +18,6 @@ use std::sync::Arc;
 
 /// Half of the difference that a derivative is taken from, m.
 const STEP: f64 = 1e-5;
-/// Steps of Newton's method from the pose of the nominal geometry: the second is below rounding.
-const NEWTON: usize = 2;
 /// Samples a second that a change of the geometry is computed at. It follows the motion and has no reversals.
 const RATE: f64 = 60.0;
 
@@ -104,21 +103,27 @@ impl Mechanism {
         };
         let at = |of: &[f64], j: usize, s: usize| of[self.actuated[j] * count + s];
         let mut y = x.clone();
-        for _ in 0..NEWTON {
-            let now = other.motion(&y)?;
-            let lack = |j: usize, s: usize| {
-                let zero = if j == leg { shift[6] } else { 0.0 };
-                actuators[0][j][s] + zero - at(&now.tree.q, j, s)
-            };
-            solved(&now.a, &lack, &mut y.q, true);
-        }
-        let now = other.motion(&y)?;
-        solved(&now.a, &|j, s| actuators[1][j][s], &mut y.qd, false);
+        let mut motion = other.motion(&y)?;
+        let lack = |j: usize, s: usize| {
+            let zero = if j == leg { shift[6] } else { 0.0 };
+            actuators[0][j][s] + zero - at(&motion.tree.q, j, s)
+        };
+        solved(&motion.a, &lack, &mut y.q, true);
+        let isa = Workspace::default().isa();
+        other.motion_into(isa, &y, &mut motion)?;
+        solved(&motion.a, &|j, s| actuators[1][j][s], &mut y.qd, false);
         y.qdd.fill(0.0);
-        let now = other.motion(&y)?;
-        let lack = |j: usize, s: usize| actuators[2][j][s] - at(&now.tree.qdd, j, s);
-        solved(&now.a, &lack, &mut y.qdd, false);
-        let motion = other.motion(&y)?;
+        other.motion_into(isa, &y, &mut motion)?;
+        let lack = |j: usize, s: usize| actuators[2][j][s] - at(&motion.tree.qdd, j, s);
+        solved(&motion.a, &lack, &mut y.qdd, false);
+        // accelerations of all joints are linear in those of the platform: `q̈ = D ẍ + Ḋ ẋ`
+        for (c, qdd) in motion.tree.qdd.chunks_exact_mut(count).enumerate() {
+            for k in 0..m {
+                let d = &motion.d[(c * m + k) * count..][..count];
+                let rows = qdd.iter_mut().zip(d).zip(&y.qdd[k * count..]);
+                rows.for_each(|((to, d), x)| *to += d * x);
+            }
+        }
         let mut gamma = vec![0.0; motion.tree.dof * count];
         let ws = &mut Workspace::default();
         self.tree

@@ -2,7 +2,7 @@
 
 use super::claim::{Claim, Means};
 use super::file_name;
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, agreeing};
 use crate::log::Table;
 use crate::log::channels;
 use crate::log::clock;
@@ -165,7 +165,11 @@ impl Frame {
                 warnings.push(Warning::new(
                     WarningKind::SamplesLeftOut,
                     format!("{subject}: {}", table.names[k]),
-                    format!("{holes} of {} values are missing", y.len()),
+                    format!(
+                        "of {} values {} missing",
+                        y.len(),
+                        agreeing(holes, "is", "are")
+                    ),
                 ));
             }
             fill(&t, &mut y, Order::Linear);

@@ -2,7 +2,7 @@
 
 use super::claim::{Claim, Means};
 use super::frame::Frame;
-use crate::error::{Warning, WarningKind};
+use crate::error::{Warning, WarningKind, counted, listed};
 use crate::log::formats::Format;
 use crate::log::names::{self, Quantity, named};
 use crate::plant::Plant;
@@ -26,7 +26,8 @@ pub(super) fn claims(
         Format::Csv | Format::Npz | Format::Mat => NAMED,
         _ => DOCUMENTED,
     };
-    let all: Vec<Option<names::Named>> = frame.names.iter().map(|n| named(n, format)).collect();
+    let mut all: Vec<Option<names::Named>> = frame.names.iter().map(|n| named(n, format)).collect();
+    untell_repeated(frame, &mut all, warnings);
     let mut out: Vec<Claim> = frame.names.iter().map(|n| Claim::none(n)).collect();
     if let Some(k) = frame.time {
         out[k].means = Means::Time;
@@ -91,6 +92,34 @@ pub(super) fn claims(
     out
 }
 
+/// Takes the joint from names that stand in the header more than once: which of them is meant is not known.
+fn untell_repeated(frame: &Frame, all: &mut [Option<names::Named>], warnings: &mut Vec<Warning>) {
+    for name in names::repeated(&frame.names) {
+        let same = |k: &usize| names::as_written(&frame.names[*k], &frame.names) == name;
+        let columns: Vec<usize> = (0..all.len()).filter(same).collect();
+        let mut told = false;
+        for k in &columns {
+            let Some(named) = &mut all[*k] else { continue };
+            named.number = None;
+            told |= named.quantity != Quantity::Time;
+            named.joint = None;
+        }
+        if told {
+            let called: Vec<String> = columns.iter().map(|k| frame.names[*k].clone()).collect();
+            warnings.push(Warning::new(
+                WarningKind::ColumnsIgnored,
+                name,
+                format!(
+                    "{} columns are called so: which is of which joint, their name does not tell. State it in \
+                     [record.columns], where they are called {}",
+                    columns.len(),
+                    listed(&called)
+                ),
+            ));
+        }
+    }
+}
+
 /// The joint of each column: by name, or in the order of the numbers.
 fn joints_of(
     columns: &[usize],
@@ -152,10 +181,9 @@ fn joints_of(
             WarningKind::ColumnsIgnored,
             &frame.names[columns[0]],
             format!(
-                "{} columns of this kind, but the robot has {} actuated joints: they were not given to joints by their \
-                 order",
-                numbers.len(),
-                own.len()
+                "{} of this kind, but the robot has {}: not given to joints by their order",
+                counted(numbers.len(), "column"),
+                counted(own.len(), "actuated joint")
             ),
         ));
         return out;

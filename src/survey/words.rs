@@ -40,7 +40,7 @@ pub fn summary(survey: &Survey, files: &[PathBuf]) -> String {
             };
             let saturated = match c.saturated {
                 0 => String::new(),
-                n => format!(", {n} samples saturated"),
+                n => format!(", {} saturated", counted(n, "sample")),
             };
             let _ = writeln!(out, "  {name:<22} {range}  {when}{saturated}");
         }

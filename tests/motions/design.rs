@@ -347,7 +347,7 @@ fn start_posture_is_kept() {
 
 #[test]
 fn interruption_keeps_the_best_so_far() {
-    let plant = Plant::load("panda").unwrap();
+    let plant = Plant::load("scara").unwrap();
     let stop = AtomicBool::new(false);
     let first = Control {
         cancel: &stop,

@@ -384,7 +384,7 @@ fn a_folder_of_its_name_does_not_hide_a_bundled_robot() {
     let lines = [
         "poses h4 --count 20 --rehearse 1 --output h4",
         "calibrate h4/calibration.toml --output h4/calibrated",
-        "design hexapod --for load --starts 1 --output hexapod",
+        "design hexapod --for load --starts 1 --harmonics 3 --no-collision --output hexapod",
     ];
     for line in lines {
         let out = test.run(line);

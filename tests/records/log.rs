@@ -211,7 +211,7 @@ fn channels_that_cannot_be_are_named() {
         }
     }))
     .unwrap();
-    says(&r, &["tau1: 10 of 2000 values were dropped"]);
+    says(&r, &["tau1: of 2000 values 10 were dropped"]);
     assert!(!r.valid[7] && r.valid[8] && r.tau[0].iter().all(|x| x.is_finite()));
     let r = read(&log("clipped.csv", &dir, 3000, |i, c| {
         let t = 0.002 * i as f64;
@@ -226,7 +226,7 @@ fn channels_that_cannot_be_are_named() {
         }
     }))
     .unwrap();
-    says(&r, &["tau1", "stands still 1 times", "100 samples"]);
+    says(&r, &["tau1", "stands still 1 time,", "100 samples"]);
     assert!(!r.valid[1050] && r.valid[900]);
     let r = read(&log("still.csv", &dir, 1000, |_, c| c[2] = "0.3".into())).unwrap();
     says(&r, &["q2", "does not move"]);

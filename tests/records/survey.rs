@@ -199,6 +199,21 @@ fn a_channel_without_numbers_is_not_recognised() {
     );
 }
 
+/// A name that stands in the header twice says what its columns are, not of which joint.
+#[test]
+fn names_that_stand_twice_tell_no_joint() {
+    let dir = tempfile::tempdir().unwrap();
+    let rows = |t| [q(t), dq(t)].concat();
+    let path = table(dir.path(), "run.csv", "t,q1,q1,dq1,dq2", rows);
+    let found = survey(&[path], None).unwrap();
+    for name in ["q1", "q1#2"] {
+        let c = found.claims.iter().find(|c| c.column == name).unwrap();
+        assert!(c.at.is_none() && c.confidence < 0.5, "{c:?}");
+    }
+    let said = |w: &excite::Warning| w.subject == "q1" && w.message.contains("2 columns");
+    assert!(found.warnings.iter().any(said), "{:?}", found.warnings);
+}
+
 /// A joint that slides in millimetres, beside others in degrees.
 #[test]
 fn millimetres_are_told_by_the_limits() {

@@ -47,13 +47,29 @@ pub(crate) fn way(
     cubic: f64,
     cycle: Option<usize>,
 ) -> [Vec<f64>; 3] {
+    // the same bits; most springs are linear and have no play
+    match gap == 0.0 && cubic == 0.0 {
+        true => stepped::<true>(carried, dt, gap, frequency, damping, cubic, cycle),
+        false => stepped::<false>(carried, dt, gap, frequency, damping, cubic, cycle),
+    }
+}
+
+/// [`way`], `LINEAR` where neither `gap` nor `cubic` is there.
+fn stepped<const LINEAR: bool>(
+    carried: Carried,
+    dt: f64,
+    gap: f64,
+    frequency: f64,
+    damping: f64,
+    cubic: f64,
+    cycle: Option<usize>,
+) -> [Vec<f64>; 3] {
     let Carried {
         load,
         mass,
         slopes: [stiff, drag],
         measured,
     } = carried;
-    let slope = |of: &[f64], i: usize| of.get(i).copied().unwrap_or(0.0);
     let omega = 2.0 * std::f64::consts::PI * frequency;
     let n = load.len();
     // sub-steps of the springs, finer than those of the average
@@ -78,29 +94,16 @@ pub(crate) fn way(
     let settle = cycle.unwrap_or(0).min(n - 1);
     if cycle.is_none() {
         // a record may begin in the middle of a motion: backwards through its begin, so that nothing swings from the start
-        let start = (x, v);
-        let backwards = |ratio: f64| {
-            let ((mut x, mut v), drained) = (start, 2.0 * ratio * mean * omega);
-            for i in (first..back).rev() {
-                let (inverse, steps) = (1.0 / mass[i].max(0.05 * mean), FINE * sub);
-                for s in 0..steps {
-                    let tau = load[i + 1] + s as f64 / steps as f64 * (load[i] - load[i + 1]);
-                    let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
-                    let tau = tau + slope(stiff, i) * x;
-                    v += h * (-k * beyond - drained * v - tau) * inverse;
-                    x += h * v;
-                }
-            }
-            // rates of the scheme are those half a step ago, here half a step ahead
-            let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
-            let tau = load[first] + slope(stiff, first) * x;
-            (
-                x,
-                -v + h * (k * beyond + tau) / mass[first].max(0.05 * mean),
-            )
+        let spring = Spring {
+            k,
+            gap,
+            mean,
+            omega,
+            h,
+            steps: FINE * sub,
         };
         (x, v) = match gap == 0.0 {
-            false => backwards(0.5),
+            false => spring.backwards([0.5], (x, v), &carried, first..back)[0],
             // seen backwards, a swing is fed: from three that are drained towards the one that is not, by a parabola
             true => {
                 let weight = |i: usize| -> f64 {
@@ -109,8 +112,9 @@ pub(crate) fn way(
                         .map(|j| (-damping - DRAINED[j]) / (DRAINED[i] - DRAINED[j]))
                         .product()
                 };
+                let states = spring.backwards(DRAINED, (x, v), &carried, first..back);
                 (0..DRAINED.len()).fold((0.0, 0.0), |sum, i| {
-                    let (state, w) = (backwards(DRAINED[i]), weight(i));
+                    let (state, w) = (states[i], weight(i));
                     (sum.0 + w * state.0, sum.1 + w * state.1)
                 })
             }
@@ -133,13 +137,16 @@ pub(crate) fn way(
                 for u in 0..sub {
                     let w = (s * sub + u) as f64 / (FINE * sub) as f64;
                     let tau = load[i.min(last)] + w * (load[next] - load[i.min(last)]);
-                    let beyond = x - x.clamp(-gap / 2.0, gap / 2.0);
+                    let beyond = match LINEAR {
+                        true => x,
+                        false => x - x.clamp(-gap / 2.0, gap / 2.0),
+                    };
                     let mut t = -k * beyond;
-                    if cubic != 0.0 {
+                    if !LINEAR && cubic != 0.0 {
                         t *= 1.0 + cubic * (beyond / twist).powi(2).min(9.0);
                     }
                     // flanks push only while they touch
-                    if gap == 0.0 {
+                    if LINEAR || gap == 0.0 {
                         t -= d * v;
                     } else if beyond != 0.0 {
                         let damped = t - d * v;
@@ -167,6 +174,58 @@ pub(crate) fn way(
         from_fine(&all, n, &mut out);
         out
     })
+}
+
+/// A slope of the load at a sample; none where it has none.
+fn slope(of: &[f64], i: usize) -> f64 {
+    of.get(i).copied().unwrap_or(0.0)
+}
+
+/// A spring, and how finely it is followed.
+struct Spring {
+    k: f64,
+    gap: f64,
+    mean: f64,
+    omega: f64,
+    h: f64,
+    /// steps of a sample
+    steps: usize,
+}
+
+impl Spring {
+    /// Way and rate at the first of these samples, from those at the last: what swings there was drained on the way back,
+    /// with each of these damping ratios.
+    fn backwards<const N: usize>(
+        &self,
+        ratios: [f64; N],
+        start: (f64, f64),
+        carried: &Carried,
+        samples: std::ops::Range<usize>,
+    ) -> [(f64, f64); N] {
+        let (load, stiff) = (carried.load, carried.slopes[0]);
+        let beyond = |x: f64| x - x.clamp(-self.gap / 2.0, self.gap / 2.0);
+        let inverse = |i: usize| carried.mass[i].max(0.05 * self.mean);
+        let drained = ratios.map(|ratio| 2.0 * ratio * self.mean * self.omega);
+        let mut states = [start; N];
+        for i in samples.clone().rev() {
+            let (inverse, stiff) = (1.0 / inverse(i), slope(stiff, i));
+            for s in 0..self.steps {
+                let tau = load[i + 1] + s as f64 / self.steps as f64 * (load[i] - load[i + 1]);
+                // side by side: each waits for its own last step only
+                for ((x, v), drained) in states.iter_mut().zip(drained) {
+                    let tau = tau + stiff * *x;
+                    *v += self.h * (-self.k * beyond(*x) - drained * *v - tau) * inverse;
+                    *x += self.h * *v;
+                }
+            }
+        }
+        // rates of the scheme are those half a step ago, here half a step ahead
+        let first = samples.start;
+        states.map(|(x, v)| {
+            let tau = load[first] + slope(stiff, first) * x;
+            (x, -v + self.h * (self.k * beyond(x) + tau) / inverse(first))
+        })
+    }
 }
 
 /// Stiffness and damping of a spring on which the link of an actuator swings with a frequency, Hz, and a damping

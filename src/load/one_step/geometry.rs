@@ -25,6 +25,7 @@ use crate::load::system::Part;
 use crate::plant::Plant;
 use faer::Mat;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
 
 /// Grid of `s`: from a micrometre to a centimetre.
 const LEAST: f64 = 1e-6;
@@ -102,7 +103,7 @@ fn columns(plant: &Plant, fit: &Fit) -> Result<Vec<Mat<f64>>> {
             changes[c][r]
         }))
     };
-    fit.solver.system.parts.iter().map(of).collect()
+    fit.solver.system.parts.par_iter().map(of).collect()
 }
 
 /// Standard deviation of the deviations that the records show, m; `None` where they show none.

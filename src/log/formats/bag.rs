@@ -15,7 +15,7 @@ mod layout;
 pub(super) use layout::append;
 
 use super::cdr::Cdr;
-use crate::error::{Error, Result, Warning, WarningKind, counted};
+use crate::error::{Error, Result, Warning, WarningKind, agreeing, counted};
 use crate::log::Table;
 use layout::{Layout, merge};
 use std::ops::ControlFlow;
@@ -280,7 +280,14 @@ impl<'a> Collector<'a> {
             warnings.push(Warning::new(
                 WarningKind::RowsLeftOut,
                 &subject,
-                format!("{damaged} messages of {name} are damaged and were left out"),
+                format!(
+                    "{} damaged and left out",
+                    agreeing(
+                        damaged,
+                        &format!("message of {name} is"),
+                        &format!("messages of {name} are")
+                    )
+                ),
             ));
         }
         for other in layouts.iter().skip(1) {
@@ -289,8 +296,12 @@ impl<'a> Collector<'a> {
                 WarningKind::RowsLeftOut,
                 &subject,
                 format!(
-                    "{} messages of {name} name other joints ({}{}) and were left out",
-                    other.stamps.len(),
+                    "{} other joints ({}{}): left out",
+                    agreeing(
+                        other.stamps.len(),
+                        &format!("message of {name} names"),
+                        &format!("messages of {name} name"),
+                    ),
                     names.join(", "),
                     if other.names.len() > 4 { ", …" } else { "" }
                 ),

@@ -1,6 +1,6 @@
 //! What is wrong with the channels of a log: dropped, stuck and saturated values, units, periods.
 
-use crate::error::{Error, Result, Warning, WarningKind, counted};
+use crate::error::{Error, Result, Warning, WarningKind, agreeing, counted};
 use crate::log::clock::Clock;
 use crate::log::resample::fill;
 use crate::log::{Record, channels};
@@ -56,9 +56,9 @@ impl Record {
                 WarningKind::SamplesLeftOut,
                 format!("{}: {name}", path.display()),
                 format!(
-                    "{} of {n} values were dropped, the first at {:.4} s; interpolated for the filters and left out of \
+                    "of {n} values {} dropped, the first at {:.4} s; interpolated for the filters and left out of \
                      the fit",
-                    holes.len(),
+                    agreeing(holes.len(), "was", "were"),
                     clock.t[first]
                 ),
             ));
@@ -246,9 +246,10 @@ fn stuck(name: String, runs: &[Range<usize>], step: f64) -> Option<Warning> {
         WarningKind::SamplesLeftOut,
         name,
         format!(
-            "it stands still {} times, {samples} samples in all, while the robot moves (first at \
+            "it stands still {}, {} in all, while the robot moves (first at \
              {:.3} s): stuck or dropped; left out of the fit",
-            runs.len(),
+            agreeing(runs.len(), "time", "times"),
+            counted(samples, "sample"),
             first as f64 * step
         ),
     ))
