@@ -49,7 +49,7 @@ pub fn within(motion: &Fourier, period: f64) -> Fourier {
 pub fn simulation(effects: Effects) -> Simulation {
     Simulation::default().with(|set| {
         set.rate = 200.0;
-        set.step = 1e-3;
+        set.step = 2.5e-3;
         set.bandwidth = 30.0;
         set.seed = 1;
         set.effects = effects;

@@ -158,7 +158,7 @@ fn stribeck_and_viscous_friction_of_a_hexapod_are_told_apart() {
 
 #[test]
 fn what_the_records_of_an_arm_cannot_show_is_shown() {
-    let mut case = Case::new("ur5e", None, 1.0, 1.0, Some(1));
+    let mut case = Case::new("scara", None, 1.0, 1.0, Some(1));
     let (before, n) = case.propose();
     assert_eq!(n.separates[1], NOMINAL);
     let hidden = |d: &Diagnosis| {

@@ -189,7 +189,7 @@ fn series_of_the_actuators_keep_all_limits_and_move_the_platform() {
         let own = mechanism(&plant).in_actuators().unwrap();
         let settings = quick(1).with(|set| {
             set.period = 4.0;
-            set.harmonics = 4;
+            set.harmonics = 3;
         });
         let design = run(&own, &settings);
         let t = &design.trajectory;

@@ -209,7 +209,7 @@ fn identify_finds_it_beside_coulomb_and_viscous_friction() {
             let motion = design(&file, &settings).unwrap().trajectory;
             let simulation = Settings::default().with(|set| {
                 set.rate = 500.0;
-                set.step = 1e-3;
+                set.step = 2e-3;
                 set.seed = 3 + k as u64;
             });
             let run = simulate(&truth, &motion.fourier, periods, &simulation, &|_| {}).unwrap();
