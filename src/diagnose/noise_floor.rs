@@ -93,6 +93,15 @@ impl Data<'_> {
         left.powi(2).max(1.0)
     }
 
+    /// The same with what repeats of the steps of a coarse encoder, which is no noise but no gap of the model either. For
+    /// whether there is a gap at all: what is named has to stand out of the rest by itself.
+    pub(super) fn steps_allowance(&self, j: usize) -> f64 {
+        match self.filtered(j) {
+            true => (1.0 + T.noise.of_steps * self.noise[j].excess).max(self.allowance(j)),
+            false => 1.0,
+        }
+    }
+
     /// Spectrum of the torque that unresolved acceleration makes.
     fn position_excess(&self, j: usize) -> Vec<f64> {
         let mut out = vec![0.0; LINES + 1];

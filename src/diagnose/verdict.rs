@@ -135,7 +135,9 @@ pub fn decide(
 /// Whether the gap of any joint is larger than a sound model leaves.
 fn stands_out(st: &State, gap: &[f64]) -> bool {
     let least = T.gap.sound * st.evidence.data.fitted as f64;
-    gap.iter().zip(&st.allowance).any(|(v, a)| *v > least * a)
+    let data = st.evidence.data;
+    let mut joints = gap.iter().enumerate();
+    joints.any(|(j, v)| *v > least * data.steps_allowance(j))
 }
 
 /// Whether the gap of any joint on records held out is far above the noise.

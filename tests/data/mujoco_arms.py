@@ -54,9 +54,9 @@ def words(x):
     return " ".join(repr(float(v)) for v in np.ravel(x))
 
 
-def arm(rng):
+def arm(rng, hobby):
     """A kind, and its links: mass, way to the next, centre of mass, moments."""
-    kind = str(rng.choice(list(KINDS)))
+    kind = "hobby" if hobby else str(rng.choice(list(KINDS)))
     length, mass, _, joints = KINDS[kind]
     links = []
     for j in range(int(rng.integers(*joints))):
@@ -97,9 +97,9 @@ def compiled(text):
 class Machine:
     """One arm, its nominal model, and what is hidden in it."""
 
-    def __init__(self, seed, number):
+    def __init__(self, seed, number, hobby=False):
         rng = self.rng = np.random.default_rng([seed, number])
-        self.kind, self.links = arm(rng)
+        self.kind, self.links = arm(rng, hobby)
         self.effect = EFFECTS[number % len(EFFECTS)]
         n = self.n = len(self.links)
         self.top = KINDS[self.kind][2]
@@ -113,10 +113,12 @@ class Machine:
             self.inertia * rng.uniform(0.1, 0.6, n),
         )
         self.joint = int(rng.integers(1, n - 1 if self.effect == "joint_coupling" else n))
-        hobby = self.kind == "hobby"
-        self.bits = 12 if hobby else int(rng.choice([12, 14, 17, 20]))
-        self.rate = int(rng.choice([200, 250, 500] if hobby else [250, 500, 1000]))
+        small = self.kind == "hobby"
+        self.bits = 12 if small else int(rng.choice([12, 14, 17, 20]))
+        self.rate = int(rng.choice([200, 250, 500] if small else [250, 500, 1000]))
         self.average = bool(rng.random() < 0.5)
+        if hobby:
+            self.rate, self.average = 500, False
         self.noise = self.scale * rng.choice([0.002, 0.005, 0.01])
         self.close = "payload" in self.effect or rng.random() < 0.3
         off = (0.003, 0.003, 0.003) if self.close else (0.2, 0.25, 0.12)
@@ -258,7 +260,7 @@ class Machine:
 def case(job):
     """What was named on one arm."""
     number, options = job
-    machine, folder = Machine(options.seed, number), options.output / f"arm_{number:03d}"
+    machine, folder = Machine(options.seed, number, options.hobby), options.output / f"arm_{number:03d}"
     machine.write(folder)
     told = [options.excite, "diagnose", folder / "experiment.toml", "--no-next", "--force", "--output", folder / "gap"]
     done = subprocess.run(told, capture_output=True, text=True, check=False)
@@ -275,6 +277,7 @@ def main():
     parser.add_argument("--arms", type=int, default=34)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of the arms that are made, instead of all")
+    parser.add_argument("--hobby", action="store_true", help="hobby arms alone: 12 bits, 500 Hz, torques at an instant")
     parser.add_argument("--claim", type=float, default=0.5, help="least confidence of a name that counts")
     parser.add_argument("--output", type=Path, default=Path("target/mujoco_arms"))
     options = parser.parse_args()
