@@ -96,10 +96,12 @@ impl Data<'_> {
     /// The same with what repeats of the steps of a coarse encoder, which is no noise but no gap of the model either. For
     /// whether there is a gap at all: what is named has to stand out of the rest by itself.
     pub(super) fn steps_allowance(&self, j: usize) -> f64 {
-        match self.filtered(j) {
-            true => (1.0 + T.noise.of_steps * self.noise[j].excess).max(self.allowance(j)),
-            false => 1.0,
+        if !self.filtered(j) {
+            return 1.0;
         }
+        let most = T.noise.most_of_steps * self.torque_rms(j) / self.noise[j].std;
+        let steps = 1.0 + T.noise.of_steps * self.noise[j].excess;
+        steps.min(most.powi(2)).max(self.allowance(j))
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.
