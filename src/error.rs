@@ -18,8 +18,7 @@ pub(crate) fn listed(names: &[String]) -> String {
 
 /// `1 gap`, `3 gaps`.
 pub(crate) fn counted(n: usize, noun: &str) -> String {
-    let plural = if n == 1 { "" } else { "s" };
-    format!("{n} {noun}{plural}")
+    agreeing(n, noun, &format!("{noun}s"))
 }
 
 /// `1 row has`, `3 rows have`.

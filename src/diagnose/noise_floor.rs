@@ -89,8 +89,12 @@ impl Data<'_> {
         if !self.filtered(j) {
             return 1.0;
         }
-        let left = T.noise.of_coarse * self.torque_rms(j) / self.noise[j].std;
-        left.powi(2).max(1.0)
+        self.share_of_torque(j, T.noise.of_coarse).max(1.0)
+    }
+
+    /// Power of a share of the torques of an actuator in the fitted records, in units of its noise variance.
+    fn share_of_torque(&self, j: usize, share: f64) -> f64 {
+        (share * self.torque_rms(j) / self.noise[j].std).powi(2)
     }
 
     /// The same with what repeats of the steps of a coarse encoder, which is no noise but no gap of the model either. For
@@ -99,9 +103,9 @@ impl Data<'_> {
         if !self.filtered(j) {
             return 1.0;
         }
-        let most = T.noise.most_of_steps * self.torque_rms(j) / self.noise[j].std;
         let steps = 1.0 + T.noise.of_steps * self.noise[j].excess;
-        steps.min(most.powi(2)).max(self.allowance(j))
+        let most = self.share_of_torque(j, T.noise.most_of_steps);
+        steps.min(most).max(self.allowance(j))
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.

@@ -47,23 +47,6 @@ pub(crate) fn way(
     cubic: f64,
     cycle: Option<usize>,
 ) -> [Vec<f64>; 3] {
-    // the same bits; most springs are linear and have no play
-    match gap == 0.0 && cubic == 0.0 {
-        true => stepped::<true>(carried, dt, gap, frequency, damping, cubic, cycle),
-        false => stepped::<false>(carried, dt, gap, frequency, damping, cubic, cycle),
-    }
-}
-
-/// [`way`], `LINEAR` where neither `gap` nor `cubic` is there.
-fn stepped<const LINEAR: bool>(
-    carried: Carried,
-    dt: f64,
-    gap: f64,
-    frequency: f64,
-    damping: f64,
-    cubic: f64,
-    cycle: Option<usize>,
-) -> [Vec<f64>; 3] {
     let Carried {
         load,
         mass,
@@ -78,6 +61,14 @@ fn stepped<const LINEAR: bool>(
     let mean = mass.iter().sum::<f64>() / n as f64;
     let k = mean * omega * omega;
     let d = 2.0 * damping * mean * omega;
+    let spring = Spring {
+        k,
+        gap,
+        mean,
+        omega,
+        h,
+        steps: FINE * sub,
+    };
     let twist = load.iter().fold(1e-12f64, |m, v| m.max(v.abs())) / k;
     // what lies between the ends that say nothing
     let (first, last) = match (cycle, measured.iter().position(|m| *m)) {
@@ -94,14 +85,6 @@ fn stepped<const LINEAR: bool>(
     let settle = cycle.unwrap_or(0).min(n - 1);
     if cycle.is_none() {
         // a record may begin in the middle of a motion: backwards through its begin, so that nothing swings from the start
-        let spring = Spring {
-            k,
-            gap,
-            mean,
-            omega,
-            h,
-            steps: FINE * sub,
-        };
         (x, v) = match gap == 0.0 {
             false => spring.backwards([0.5], (x, v), &carried, first..back)[0],
             // seen backwards, a swing is fed: from three that are drained towards the one that is not, by a parabola
@@ -137,16 +120,13 @@ fn stepped<const LINEAR: bool>(
                 for u in 0..sub {
                     let w = (s * sub + u) as f64 / (FINE * sub) as f64;
                     let tau = load[i.min(last)] + w * (load[next] - load[i.min(last)]);
-                    let beyond = match LINEAR {
-                        true => x,
-                        false => x - x.clamp(-gap / 2.0, gap / 2.0),
-                    };
+                    let beyond = spring.beyond(x);
                     let mut t = -k * beyond;
-                    if !LINEAR && cubic != 0.0 {
+                    if cubic != 0.0 {
                         t *= 1.0 + cubic * (beyond / twist).powi(2).min(9.0);
                     }
                     // flanks push only while they touch
-                    if LINEAR || gap == 0.0 {
+                    if gap == 0.0 {
                         t -= d * v;
                     } else if beyond != 0.0 {
                         let damped = t - d * v;
@@ -193,6 +173,14 @@ struct Spring {
 }
 
 impl Spring {
+    /// How far the link is beyond a flank.
+    fn beyond(&self, x: f64) -> f64 {
+        match self.gap == 0.0 {
+            true => x,
+            false => x - x.clamp(-self.gap / 2.0, self.gap / 2.0),
+        }
+    }
+
     /// Way and rate at the first of these samples, from those at the last: what swings there was drained on the way back,
     /// with each of these damping ratios.
     fn backwards<const N: usize>(
@@ -203,7 +191,6 @@ impl Spring {
         samples: std::ops::Range<usize>,
     ) -> [(f64, f64); N] {
         let (load, stiff) = (carried.load, carried.slopes[0]);
-        let beyond = |x: f64| x - x.clamp(-self.gap / 2.0, self.gap / 2.0);
         let inverse = |i: usize| carried.mass[i].max(0.05 * self.mean);
         let drained = ratios.map(|ratio| 2.0 * ratio * self.mean * self.omega);
         let mut states = [start; N];
@@ -214,7 +201,7 @@ impl Spring {
                 // side by side: each waits for its own last step only
                 for ((x, v), drained) in states.iter_mut().zip(drained) {
                     let tau = tau + stiff * *x;
-                    *v += self.h * (-self.k * beyond(*x) - drained * *v - tau) * inverse;
+                    *v += self.h * (-self.k * self.beyond(*x) - drained * *v - tau) * inverse;
                     *x += self.h * *v;
                 }
             }
@@ -223,7 +210,10 @@ impl Spring {
         let first = samples.start;
         states.map(|(x, v)| {
             let tau = load[first] + slope(stiff, first) * x;
-            (x, -v + self.h * (self.k * beyond(x) + tau) / inverse(first))
+            (
+                x,
+                -v + self.h * (self.k * self.beyond(x) + tau) / inverse(first),
+            )
         })
     }
 }
