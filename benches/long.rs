@@ -134,6 +134,7 @@ fn long(plant: &Plant, path: &Path, rows: usize) -> Result<(), Box<dyn std::erro
     let start = Instant::now();
     let mut settings = Settings::default();
     settings.signals.cutoff = Some(5.0);
+    settings.signals.thin = true;
     let mut sum: Option<Factor> = None;
     Record::read_parts(path, plant, Purpose::Fit, None, each, &mut |part| {
         let next = condense(plant, "panda", None, &[part], &settings)?;

@@ -24,10 +24,14 @@ pub fn term_factor(term: JointTerm, [_, qd, qdd]: [f64; 3]) -> f64 {
     match term {
         JointTerm::Armature => qdd,
         JointTerm::Viscous => qd,
-        JointTerm::Coulomb if qd == 0.0 => 0.0,
-        JointTerm::Coulomb => qd.signum(),
+        JointTerm::Coulomb => sign(qd),
         JointTerm::Offset => 1.0,
     }
+}
+
+/// Sign of a velocity, 0 at rest.
+pub(crate) fn sign(qd: f64) -> f64 {
+    if qd == 0.0 { 0.0 } else { qd.signum() }
 }
 
 impl Regressor {

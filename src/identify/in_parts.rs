@@ -22,12 +22,16 @@ use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::{Outline, Payload, Purpose, Record};
 use crate::plant::Plant;
 use crate::signals;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, mpsc};
 
 /// Rows that figures show of a record, or two periods where those are more.
 const SHOWN: usize = 60_000;
 /// Most records that figures show.
 const RECORDS: usize = 6;
+/// Most parts that are condensed at a time.
+const AT_ONCE: usize = 4;
 
 /// Records that were read in parts.
 pub struct Condensed {
@@ -41,7 +45,7 @@ pub struct Condensed {
     pub settings: Settings,
 }
 
-/// Condenses the records of an experiment, read in parts of `rows` rows; `check` looks at each part.
+/// Condenses the records of an experiment, read in parts of `rows` rows; `check` looks at the first part of each.
 ///
 /// The cut-off, where none is stated, is chosen from the first part of each fit record in which something moves.
 ///
@@ -53,7 +57,7 @@ pub fn condense_parts(
     asked: Option<&[String]>,
     rows: usize,
     settings: &Settings,
-    check: &dyn Fn(&Record) -> Result<Vec<Warning>>,
+    check: &(dyn Fn(&Record) -> Result<Vec<Warning>> + Sync),
 ) -> Result<Condensed> {
     if !matches!(settings.method, Method::Ols | Method::Wls) {
         return Err(Error::Argument(
@@ -71,40 +75,47 @@ pub fn condense_parts(
     for k in 0..purposes.len() {
         let mut sum: Option<Factor> = None;
         let mut share: Option<Share> = None;
-        each_part(outline, k, rows, &mut |part| {
-            let mut warnings = check(&part)?;
+        let work = |index: usize, part: Record| -> Result<Done> {
+            let mut warnings = match index {
+                0 => check(&part)?,
+                _ => Vec::new(),
+            };
             let used = equations::without_payload(std::slice::from_ref(&part), &mut warnings)?;
             if used.is_empty() {
-                left_out.append(&mut warnings);
-                return Ok(ControlFlow::Break(()));
+                return Ok(Done::LeftOut(warnings));
             }
-            let next = of_records(
-                plant,
-                &base,
-                &outline.spec,
-                asked,
-                used,
-                &settings,
-                warnings,
-            )?;
-            sum = Some(match sum.take() {
-                Some(all) => all.and_then(next)?,
-                None => next,
-            });
-            let share = share.get_or_insert_with(|| {
-                let first = head(&part);
-                let share = Share {
-                    record: first.name.clone(),
-                    rows: 0,
-                    parts: 0,
-                    shown: 0,
-                };
-                if shown.len() < RECORDS {
-                    shown.push(first);
+            let spec = &outline.spec;
+            let factor = of_records(plant, &base, spec, asked, used, &settings, warnings)?;
+            Ok(Done::Part {
+                factor: Box::new(factor),
+                rows: part.len(),
+                head: (index == 0).then(|| Box::new(head(&part))),
+            })
+        };
+        each_part(outline, k, rows, &work, &mut |done| {
+            let (factor, rows, first) = match done {
+                Done::LeftOut(mut warnings) => {
+                    left_out.append(&mut warnings);
+                    return Ok(ControlFlow::Break(()));
                 }
-                share
+                Done::Part { factor, rows, head } => (*factor, rows, head),
+            };
+            sum = Some(match sum.take() {
+                Some(all) => all.and_then(factor)?,
+                None => factor,
             });
-            share.rows += part.len();
+            let share = share.get_or_insert_with(|| Share {
+                record: first.as_ref().map_or(String::new(), |r| r.name.clone()),
+                rows: 0,
+                parts: 0,
+                shown: 0,
+            });
+            if let Some(first) = first
+                && shown.len() < RECORDS
+            {
+                shown.push(*first);
+            }
+            share.rows += rows;
             share.parts += 1;
             Ok(ControlFlow::Continue(()))
         })?;
@@ -140,32 +151,77 @@ pub fn condense_parts(
     })
 }
 
-/// Hands the parts of a record to `each` in their order; the next one is read meanwhile.
-fn each_part(
+/// What becomes of a part.
+enum Done {
+    /// the record is of no use here, for these reasons
+    LeftOut(Vec<Warning>),
+    /// its equations
+    Part {
+        factor: Box<Factor>,
+        rows: usize,
+        /// the first rows, of the first part
+        head: Option<Box<Record>>,
+    },
+}
+
+/// Does `work` for the parts of a record, several at a time, and hands what comes of it to `each` in their order; the next
+/// one is read meanwhile.
+fn each_part<T: Send>(
     outline: &Outline,
     record: usize,
     rows: usize,
-    each: &mut dyn FnMut(Record) -> Result<ControlFlow<()>>,
+    work: &(dyn Fn(usize, Record) -> Result<T> + Sync),
+    each: &mut dyn FnMut(T) -> Result<ControlFlow<()>>,
 ) -> Result<()> {
+    let workers = rayon::current_num_threads().clamp(1, AT_ONCE);
     std::thread::scope(|scope| {
-        let (send, receive) = std::sync::mpsc::sync_channel(0);
+        let (send, parts) = mpsc::sync_channel(0);
         let reader = scope.spawn(move || {
+            let mut index = 0;
             outline.parts(record, rows, &mut |part| {
-                Ok(match send.send(part) {
+                index += 1;
+                Ok(match send.send((index - 1, part)) {
                     Ok(()) => ControlFlow::Continue(()),
                     // nobody wants more
                     Err(_) => ControlFlow::Break(()),
                 })
             })
         });
-        for part in &receive {
-            if each(part)?.is_break() {
-                break;
+        let (give, done) = mpsc::channel();
+        let parts = Arc::new(Mutex::new(parts));
+        for _ in 0..workers {
+            let (parts, give) = (Arc::clone(&parts), give.clone());
+            scope.spawn(move || {
+                loop {
+                    let next = parts.lock().map(|parts| parts.recv());
+                    let Ok(Ok((index, part))) = next else { break };
+                    if give.send((index, work(index, part))).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop((parts, give));
+        let mut waiting = BTreeMap::new();
+        let mut next = 0;
+        let mut ended = Ok(());
+        'parts: for (index, result) in &done {
+            waiting.insert(index, result);
+            while let Some(result) = waiting.remove(&next) {
+                next += 1;
+                match result.and_then(&mut *each) {
+                    Ok(ControlFlow::Continue(())) => {}
+                    Ok(ControlFlow::Break(())) => break 'parts,
+                    Err(e) => {
+                        ended = Err(e);
+                        break 'parts;
+                    }
+                }
             }
         }
-        drop(receive);
+        drop(done);
         match reader.join() {
-            Ok(read) => read,
+            Ok(read) => ended.and(read),
             Err(panic) => std::panic::resume_unwind(panic),
         }
     })
@@ -174,6 +230,7 @@ fn each_part(
 /// The cut-off that all parts share.
 fn one_filter(outline: &Outline, rows: usize, settings: &Settings) -> Result<Settings> {
     let mut settings = settings.clone();
+    settings.signals.thin = true;
     if settings.signals.cutoff.is_some() {
         return Ok(settings);
     }
@@ -192,12 +249,14 @@ fn one_filter(outline: &Outline, rows: usize, settings: &Settings) -> Result<Set
     Ok(settings)
 }
 
-/// The first rows of a part, under the name of the record.
+/// The first rows of a part, under the name of the record: without the number of the part.
 fn head(part: &Record) -> Record {
     let periods = part.periods().map_or(0, |(each, _)| 2 * each);
     let mut out = part.first(SHOWN.max(periods));
-    if let Some(at) = out.name.rfind('[') {
-        out.name.truncate(at);
+    if let (Some(from), Some(to)) = (out.name.rfind('['), out.name.rfind(']'))
+        && from < to
+    {
+        out.name.replace_range(from..=to, "");
     }
     out
 }

@@ -5,6 +5,7 @@ use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::log::Purpose;
 use crate::plant::Plant;
+use crate::regressor::sign;
 use crate::signals::Prepared;
 use faer::Mat;
 use rayon::prelude::*;
@@ -67,8 +68,11 @@ impl Stack {
         motion: &Samples,
     ) -> Result<Stack> {
         let (n, m, b) = (p.actuators, p.outputs(), base.count());
-        let reach = p.filter.reach();
-        let each = (BLOCK.max(4 * reach) / p.filter.factor).max(16);
+        let jumps = plant.jumps();
+        // where the columns are smooth, fewer samples hold them
+        let thin = p.thin.as_ref().zip(jumps.as_deref());
+        let (stride, filter) = thin.map_or((1, &p.filter), |(t, _)| (t.stride, &t.filter));
+        let each = (BLOCK.max(4 * filter.reach()) / filter.factor).max(16);
         let ranges: Vec<_> = (0..m)
             .step_by(each)
             .map(|from| from..(from + each).min(m))
@@ -76,10 +80,10 @@ impl Stack {
         let parts: Vec<Part> = ranges
             .par_iter()
             .map(|range| {
-                let inputs = p.filter.inputs(range.clone());
+                let mut inputs = filter.inputs(range.clone());
+                inputs.iter_mut().for_each(|i| *i *= stride);
                 let part = motion.select(&inputs);
                 let w = plant.regressor_columns(&part)?;
-                let known = plant.known_torque(&part)?;
                 let outputs = range.len();
                 let mut out = Part {
                     w: vec![0.0; b * n * outputs],
@@ -92,12 +96,30 @@ impl Stack {
                         let from = &column[a * count..(a + 1) * count];
                         if from.iter().any(|x| *x != 0.0) {
                             let to = &mut to[a * outputs..(a + 1) * outputs];
-                            p.filter.apply_part(from, range.clone(), to);
+                            filter.apply_part(from, range.clone(), to);
                         }
                     }
                 }
+                let (known, whole) = match thin {
+                    None => (plant.known_torque(&part)?, count),
+                    Some((_, jumps)) => {
+                        let inputs = p.filter.inputs(range.clone());
+                        let part = motion.select(&inputs);
+                        for (c, to) in out.w.chunks_exact_mut(n * outputs).enumerate() {
+                            let Some((_, joint)) = jumps.iter().find(|j| j.0 == base.kept[c])
+                            else {
+                                continue;
+                            };
+                            let speeds = &part.qd[joint * part.count..][..part.count];
+                            let signs: Vec<f64> = speeds.iter().map(|x| sign(*x)).collect();
+                            let to = &mut to[joint * outputs..(joint + 1) * outputs];
+                            p.filter.apply_part(&signs, range.clone(), to);
+                        }
+                        (plant.known_torque(&part)?, part.count)
+                    }
+                };
                 for a in 0..n {
-                    let from = &known[a * count..(a + 1) * count];
+                    let from = &known[a * whole..(a + 1) * whole];
                     let to = &mut out.known[a * outputs..(a + 1) * outputs];
                     p.filter.apply_part(from, range.clone(), to);
                 }

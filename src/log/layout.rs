@@ -81,6 +81,8 @@ pub(crate) struct Layout {
     pub currents: bool,
     /// whether torques are currents times gains that are stated
     pub gains: bool,
+    /// the stamp from which the time is counted, once it is known: parts of a log have one clock
+    pub origin: Option<f64>,
     pub warnings: Vec<Warning>,
 }
 
@@ -178,7 +180,7 @@ impl Layout {
     }
 
     /// The columns as ours, `t`, `q1` … .
-    pub fn apply(&self, table: &mut Table, joints: &[&Joint], path: &Path) -> Result<Table> {
+    pub fn apply(&mut self, table: &mut Table, joints: &[&Joint], path: &Path) -> Result<Table> {
         let rows = table.rows();
         let mut out = Table {
             warnings: std::mem::take(&mut table.warnings),
@@ -186,13 +188,17 @@ impl Layout {
         };
         out.warnings.extend(self.warnings.iter().cloned());
         let subject = path.display().to_string();
-        let t = match &self.time {
-            Some(Time::Rate(rate)) => (0..rows).map(|i| i as f64 / rate).collect(),
+        let t = match &mut self.time {
+            Some(Time::Rate(rate)) => (0..rows).map(|i| i as f64 / *rate).collect(),
             Some(Time::Column(place, factor)) => {
                 let mut t = table.columns[place.find(table, path)?].clone();
-                let (factor, name) = match factor {
-                    Some(f) => (*f, ""),
-                    None => time_unit(&t),
+                let (factor, name) = match *factor {
+                    Some(f) => (f, ""),
+                    None => {
+                        let found = time_unit(&t);
+                        *factor = Some(found.0);
+                        found
+                    }
                 };
                 if !name.is_empty() && name != "s" {
                     out.warnings.push(Warning::new(
@@ -206,6 +212,7 @@ impl Layout {
                     Some(x) if x.abs() * factor > 1e6 => *x,
                     _ => 0.0,
                 };
+                let origin = *self.origin.get_or_insert(origin);
                 t.iter_mut().for_each(|x| *x = (*x - origin) * factor);
                 t
             }
@@ -240,10 +247,6 @@ impl Layout {
             }
             for (j, source) in group.sources.iter().enumerate() {
                 let at = source.place.find(table, path)?;
-                if table.columns[at].is_empty() {
-                    let message = format!("column {} holds no numbers", table.names[at]);
-                    return Err(Error::file(path, "", message));
-                }
                 if used.contains(&at) {
                     let message = format!(
                         "column {} is named twice, the second time as {}{}",
@@ -254,10 +257,14 @@ impl Layout {
                     return Err(Error::file(path, "", message));
                 }
                 used.push(at);
-                let values = table.columns[at]
-                    .iter()
-                    .map(|x| x * source.factor)
-                    .collect();
+                let mut values = std::mem::take(&mut table.columns[at]);
+                if values.is_empty() {
+                    let message = format!("column {} holds no numbers", table.names[at]);
+                    return Err(Error::file(path, "", message));
+                }
+                if source.factor != 1.0 {
+                    values.iter_mut().for_each(|x| *x *= source.factor);
+                }
                 let values = match source.delay == 0.0 {
                     true => values,
                     false => earlier(&out.columns[0], values, source.delay),

@@ -173,28 +173,31 @@ impl Record {
         period: Option<f64>,
         part: [Option<f64>; 2],
     ) -> Result<Record> {
-        let (mut record, clock) = Self::repaired(table, path, plant, purpose, period, part)?;
+        let clock = Self::clock(&table, path).between(part, path)?;
+        let (mut record, clock) = Self::repaired(table, clock, path, plant, purpose, period)?;
         record.written = record.before_grid(&clock);
         record.put_on_grid(&clock)?;
         Ok(record)
     }
 
-    /// A record from the columns of a log, at the times at which they were taken.
+    /// The clock of a log.
+    fn clock(table: &Table, path: &Path) -> Clock {
+        let at = table.find("t").unwrap_or(0);
+        clock::repair(&table.columns[at], &path.display().to_string())
+    }
+
+    /// A record from the columns of a log, at those times of its clock at which they were taken.
     fn repaired(
         mut table: Table,
+        clock: Clock,
         path: &Path,
         plant: &Plant,
         purpose: Purpose,
         period: Option<f64>,
-        part: [Option<f64>; 2],
     ) -> Result<(Record, Clock)> {
         let joints = plant.actuators();
         let n = joints.len();
         let mut warnings = std::mem::take(&mut table.warnings);
-        let subject = path.display().to_string();
-
-        let at = table.find("t").unwrap_or(0);
-        let clock = clock::repair(&table.columns[at], &subject).between(part, path)?;
         warnings.extend(clock.warnings.iter().cloned());
         if clock.t.len() < 8 {
             let message = match table.rows() >= 8 {

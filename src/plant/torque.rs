@@ -39,6 +39,24 @@ impl Plant {
         }
     }
 
+    /// Columns of the regressor that jump, and the joint in whose equation alone each stands: those of Coulomb friction. All
+    /// others are smooth in the motion. `None` of a closed chain, where friction of a joint is in the equations of several
+    /// actuators.
+    pub(crate) fn jumps(&self) -> Option<Vec<(usize, usize)>> {
+        if self.mechanism().is_some() {
+            return None;
+        }
+        let dry = |p: &crate::robot::Parameter| match p.kind {
+            Column::Term {
+                joint,
+                term: JointTerm::Coulomb,
+            } => Some(joint),
+            _ => None,
+        };
+        let all = self.parameters.iter().enumerate();
+        Some(all.filter_map(|(c, p)| Some((c, dry(p)?))).collect())
+    }
+
     /// Torque of the nominal model, all terms included, actuator-major, N m or N.
     ///
     /// # Errors

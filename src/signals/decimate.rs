@@ -46,18 +46,32 @@ impl Decimator {
     /// where the last is followed by the first. An infinite `cutoff` passes everything, and then
     /// `factor` is 1.
     pub fn new(cutoff: f64, rate: f64, valid: &[bool], cyclic: bool) -> Self {
+        Self::with_stride(cutoff, rate, valid, cyclic, 1).0
+    }
+
+    /// The same with outputs that lie `k` strides apart, for as long a stride of no more than `most` samples as keeps `k`
+    /// times it near `factor`. Beside it the stride.
+    pub fn with_stride(
+        cutoff: f64,
+        rate: f64,
+        valid: &[bool],
+        cyclic: bool,
+        most: usize,
+    ) -> (Self, usize) {
         let count = valid.len();
         let fraction = cutoff / rate;
         let all = fraction.is_nan() || fraction >= 0.3 || count == 0;
-        let (factor, taps) = match all {
-            true => (1, vec![1.0]),
+        let (factor, stride, taps) = match all {
+            true => (1, 1, vec![1.0]),
             false => {
                 let factor = ((1.0 / (3.0 * fraction)).floor() as usize).max(1);
-                (factor, kaiser(fraction, count, cyclic))
+                let strides = factor.div_ceil(most.max(1));
+                let stride = factor / strides;
+                (strides * stride, stride, kaiser(fraction, count, cyclic))
             }
         };
         let reach = taps.len() - 1;
-        let kernel = taps.iter().skip(1).rev().chain(&taps).copied().collect();
+        let kernel = both_sides(&taps);
         // sound samples before each, to see at once whether a whole support is
         let mut sound = Vec::with_capacity(count + 1);
         sound.push(0usize);
@@ -83,7 +97,7 @@ impl Decimator {
             .step_by(factor)
             .filter(|&i| whole(i as isize - reach as isize, (i + reach + 1) as isize))
             .collect();
-        Decimator {
+        let filter = Decimator {
             cutoff: if all { f64::INFINITY } else { cutoff },
             factor,
             taps,
@@ -91,7 +105,28 @@ impl Decimator {
             at,
             cyclic,
             count,
+        };
+        (filter, stride)
+    }
+
+    /// The same filter over every `stride`-th sample, from the first on: what it makes of signals that have nothing beyond
+    /// half of their rate differs by what its stop band lets pass (80 dB). `None` where the outputs do not stand at such samples,
+    /// or the signal repeats.
+    pub fn over_every(&self, stride: usize) -> Option<Decimator> {
+        if self.cyclic || stride < 2 || !self.factor.is_multiple_of(stride) {
+            return None;
         }
+        let mut taps: Vec<f64> = self.taps.iter().step_by(stride).copied().collect();
+        normalise(&mut taps);
+        Some(Decimator {
+            cutoff: self.cutoff,
+            factor: self.factor / stride,
+            kernel: both_sides(&taps),
+            taps,
+            at: self.at.iter().map(|i| i / stride).collect(),
+            cyclic: false,
+            count: self.count.div_ceil(stride),
+        })
     }
 
     /// Inputs at which the outputs stand.
@@ -221,7 +256,17 @@ fn kaiser(fraction: f64, count: usize, cyclic: bool) -> Vec<f64> {
             sinc * bessel(BETA * (1.0 - x * x).max(0.0).sqrt()) / bessel(BETA)
         })
         .collect();
+    normalise(&mut taps);
+    taps
+}
+
+/// Makes the gain at zero frequency 1, of half a kernel.
+fn normalise(taps: &mut [f64]) {
     let sum = taps[0] + 2.0 * taps[1..].iter().sum::<f64>();
     taps.iter_mut().for_each(|t| *t /= sum);
-    taps
+}
+
+/// A kernel from its half.
+fn both_sides(taps: &[f64]) -> Vec<f64> {
+    taps.iter().skip(1).rev().chain(taps).copied().collect()
 }

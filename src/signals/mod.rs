@@ -44,7 +44,7 @@ pub(crate) mod wiener;
 pub use butterworth::Butterworth;
 #[doc(hidden)]
 pub use decimate::Decimator;
-pub(crate) use parts::{Derivation, Periods};
+pub(crate) use parts::{Derivation, Periods, Thin};
 pub(crate) use prepare::mean;
 #[doc(hidden)]
 pub use prepare::{averaged, common_cutoff};
@@ -70,6 +70,9 @@ pub struct Settings {
     pub average: bool,
     /// whether measured velocities and accelerations are used where the log has them
     pub measured_rates: bool,
+    /// whether the columns of the regressor that have no jumps are computed at fewer samples, where the low-pass of the
+    /// positions leaves them nothing in between: for long logs of trees ([`Thin`])
+    pub thin: bool,
     /// whether the pose columns give the coordinates of a parallel robot, instead of its actuators
     pub measured_pose: bool,
 }
@@ -85,6 +88,7 @@ impl Default for Settings {
             order: 4,
             average: true,
             measured_rates: true,
+            thin: false,
             measured_pose: false,
         }
     }
@@ -121,6 +125,9 @@ pub struct Prepared {
     pub cutoff_reason: String,
     /// the filter that torque and regressor pass
     pub filter: Decimator,
+    /// the same over fewer samples, where these hold all of the motion
+    #[serde(skip)]
+    pub thin: Option<Thin>,
     /// what was found on the way
     pub warnings: Vec<Warning>,
 }

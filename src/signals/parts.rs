@@ -1,5 +1,6 @@
 //! What the types of the [module above](super) are made of, and what their settings choose from.
 
+use super::Decimator;
 use faer::Mat;
 
 /// How positions are differentiated.
@@ -34,4 +35,16 @@ pub struct Periods {
     pub torque_covariance: Mat<f64>,
     /// standard deviation of the position noise of one period of each actuator
     pub position_noise: Vec<f64>,
+}
+
+/// The filter over fewer samples of the motion.
+///
+/// Positions that were cut off at `f_p` have next to nothing beyond a few `f_p`, and the columns of the regressor that are
+/// smooth functions of them neither. So one sample in `stride` holds what the filter passes of these columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thin {
+    /// every so many-th sample counts, from the first on
+    pub stride: usize,
+    /// the filter over those
+    pub filter: Decimator,
 }

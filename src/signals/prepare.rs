@@ -1,7 +1,7 @@
 //! From a record to a [`Prepared`] one.
 
 use super::butterworth::{first_derivative, second_derivative, smoother};
-use super::{Decimator, Derivation, Periods, Prepared, Settings, cutoff, fourier, wiener};
+use super::{Decimator, Derivation, Periods, Prepared, Settings, Thin, cutoff, fourier, wiener};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::Record;
@@ -9,6 +9,8 @@ use crate::plant::{self, Plant};
 use faer::Mat;
 use rayon::prelude::*;
 
+/// Samples that hold a motion, in cut-offs of its positions.
+const DENSITY: f64 = 8.0;
 /// Cut-off of the parallel filter, in bandwidths of the motion.
 const BANDS: f64 = 10.0;
 /// Highest cut-off of the positions, in cut-offs of the parallel filter, which its pass band must not
@@ -156,6 +158,7 @@ impl Prepared {
                 position_cutoff: frequencies,
                 cutoff_reason: reason.into(),
                 filter: Decimator::new(f64::INFINITY, rate, &[], false),
+                thin: None,
                 warnings: Vec::new(),
             },
             settings,
@@ -286,6 +289,7 @@ impl Prepared {
                 }),
                 cutoff_reason: reason.into(),
                 filter: Decimator::new(f64::INFINITY, rate, &[], true),
+                thin: None,
                 warnings,
             },
             settings,
@@ -345,7 +349,14 @@ fn check(settings: &Settings, record: &Record) -> Result<()> {
 fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
     let cutoff = settings.cutoff.unwrap_or(f64::INFINITY);
     let cyclic = p.periods.is_some();
-    p.filter = Decimator::new(cutoff, p.rate, &p.valid, cyclic);
+    let most = match settings.thin && settings.derivation == Derivation::LowPass {
+        true => thin_stride(&p, cutoff),
+        false => 1,
+    };
+    let (filter, stride) = Decimator::with_stride(cutoff, p.rate, &p.valid, cyclic, most);
+    p.filter = filter;
+    let thin = p.filter.over_every(stride);
+    p.thin = thin.map(|filter| Thin { stride, filter });
     if p.filter.outputs() < 4 {
         return Err(Error::Infeasible(format!(
             "record {}: after filtering at {cutoff:.3} Hz {} sound samples are left. A sample counts where all channels are \
@@ -356,6 +367,14 @@ fn finish(mut p: Prepared, settings: &Settings) -> Result<Prepared> {
         )));
     }
     Ok(p)
+}
+
+/// Samples of the motion of which one is enough for the columns that are smooth in it: `1/(8 f)` apart, with the highest cut-off
+/// `f` of the positions, or that of the filter if it is higher. Both passes of the smoother leave `1/(1 + 4⁸)` at half of that
+/// rate.
+fn thin_stride(p: &Prepared, cutoff: f64) -> usize {
+    let highest = p.position_cutoff.iter().cloned().fold(cutoff, f64::max);
+    ((p.rate / (DENSITY * highest)) as usize).max(1)
 }
 
 /// Velocities and accelerations of the coordinates where the log has those of the actuators and they

@@ -65,6 +65,7 @@ pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
     let mut parts = Vec::new();
     for path in files {
         let request = Request {
+            skip: None,
             format: None,
             topic: None,
             wanted: &|_| true,

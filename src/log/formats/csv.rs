@@ -4,9 +4,10 @@
 //! threads, straight into columns. In memory are the columns and one block, whatever the size of the
 //! file. Lines that are no rows are left out and named.
 
-use super::Each;
 use super::dialect::{Cell, Dialect, canonical, idle, stamp, strip};
+use super::{Each, Skip};
 use crate::error::{Error, Result, Warning, WarningKind};
+use crate::log::layout::Place;
 use crate::log::{Table, number};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -55,7 +56,7 @@ pub(crate) fn read<T>(
     wanted: &dyn Fn(&str) -> bool,
     check: &dyn Fn(&Table) -> Result<T>,
 ) -> Result<(Table, T)> {
-    read_parts(path, wanted, check, usize::MAX, &mut |_| {
+    read_parts(path, wanted, check, usize::MAX, None, &mut |_| {
         Ok(ControlFlow::Continue(()))
     })
 }
@@ -67,8 +68,10 @@ pub(crate) fn read_parts<T>(
     wanted: &dyn Fn(&str) -> bool,
     check: &dyn Fn(&Table) -> Result<T>,
     rows: usize,
+    skip: Option<Skip>,
     each: Each,
 ) -> Result<(Table, T)> {
+    let mut skip = skip.map(Skipping::new);
     let most = rows.saturating_add(rows / 2);
     let mut given = 0;
     let mut checked = None;
@@ -126,7 +129,25 @@ pub(crate) fn read_parts<T>(
             checked = Some(check(&table)?);
             layout = Some((dialect, keep));
         }
-        if let Some((dialect, keep)) = &layout {
+        let early = skip
+            .as_mut()
+            .zip(layout.as_ref())
+            .is_some_and(|(s, (dialect, _))| s.early(text, dialect));
+        if early && given + table.rows() > 0 {
+            // what was read before is a part of its own
+            let held = table.rows();
+            if held > 0 {
+                given += held;
+                let mut part = first_rows(&mut table, held);
+                if let Some((dialect, _)) = &layout {
+                    without_texts(&mut part, dialect);
+                }
+                if each(part)?.is_break() {
+                    break 'file;
+                }
+            }
+            line += text.iter().filter(|b| **b == b'\n').count();
+        } else if let Some((dialect, keep)) = &layout {
             let cut_off = end && !text.is_empty() && text.last() != Some(&b'\n');
             let text: Cow<[u8]> = match dialect.plain {
                 true => Cow::Borrowed(text),
@@ -205,6 +226,60 @@ pub(crate) fn read_parts<T>(
     }));
     without_texts(&mut table, &dialect);
     Ok((table, checked))
+}
+
+/// Blocks of rows that come before those that count.
+struct Skipping {
+    what: Skip,
+    /// first and last stamp that was seen; `None` before there is any
+    seen: Option<[f64; 2]>,
+    /// whether the stamps increased so far
+    sound: bool,
+}
+
+impl Skipping {
+    fn new(what: Skip) -> Self {
+        Skipping {
+            what,
+            seen: None,
+            sound: true,
+        }
+    }
+
+    /// Whether all rows of a block come too early, by its first and last line. Stamps that do not increase from block to
+    /// block say nothing, and nothing that follows is skipped.
+    fn early(&mut self, text: &[u8], dialect: &Dialect) -> bool {
+        let column = match &self.what.time {
+            Place::Name(name) => dialect.names.iter().position(|n| n == name),
+            // columns of texts are not counted
+            Place::Number(k) => {
+                let numbers = (0..dialect.cells.len()).filter(|&k| dialect.cells[k] != Cell::Text);
+                k.checked_sub(1).and_then(|k| numbers.clone().nth(k))
+            }
+        };
+        let column = column.filter(|k| dialect.plain && dialect.cells[*k] == Cell::Number);
+        let Some(column) = column.filter(|_| self.sound) else {
+            return false;
+        };
+        let stamp = |line: &[u8]| {
+            let cell = line.split(|b| *b == dialect.delimiter).nth(column)?;
+            number::parse(cell.trim_ascii()).filter(|x| x.is_finite())
+        };
+        let mut lines = text.trim_ascii_end();
+        let first = lines.split(|b| *b == b'\n').next().and_then(stamp);
+        if let Some(at) = lines.iter().rposition(|b| *b == b'\n') {
+            lines = &lines[at + 1..];
+        }
+        let (Some(first), Some(last)) = (first, stamp(lines)) else {
+            self.sound = false;
+            return false;
+        };
+        let [origin, before] = self.seen.unwrap_or([first, first]);
+        self.sound = before <= first && first <= last;
+        self.seen = Some([origin, last]);
+        // a row to spare for what is written with few digits
+        self.sound && last - origin < self.what.before * (1.0 - 1e-9) - 1e-6
+    }
 }
 
 /// Takes the first rows out of a table; columns that are not kept are empty.

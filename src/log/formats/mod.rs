@@ -21,6 +21,7 @@ mod sqlite;
 
 use super::Table;
 use crate::error::{Error, Result};
+use crate::log::layout::Place;
 use std::io::Read as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -93,6 +94,17 @@ pub(crate) struct Request<'a> {
     pub topic: Option<&'a str>,
     /// whether a column of this name is kept
     pub wanted: &'a dyn Fn(&str) -> bool,
+    /// rows that need not be read, of a text that comes in parts
+    pub skip: Option<Skip>,
+}
+
+/// Rows that come too early.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Skip {
+    /// where the time stands
+    pub time: Place,
+    /// how long after the first stamp the first row comes that counts, in the unit of the stamps
+    pub before: f64,
 }
 
 /// A table and what it came from.
@@ -194,7 +206,14 @@ pub(crate) fn read_parts(
             enough = matches!(next, Ok(ControlFlow::Break(())));
             next
         };
-        let (last, ()) = csv::read_parts(path, request.wanted, &|_| Ok(()), rows, &mut one)?;
+        let (last, ()) = csv::read_parts(
+            path,
+            request.wanted,
+            &|_| Ok(()),
+            rows,
+            request.skip.clone(),
+            &mut one,
+        )?;
         if !enough {
             let _ = text(last, each)?;
         }

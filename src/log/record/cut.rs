@@ -16,17 +16,25 @@ const FEW: usize = 50;
 /// Larger numbers are impossible in any unit.
 const LARGEST: f64 = 1e12;
 
+/// Stamps that are written with few digits lie this far from where they should, s.
+const SLACK: f64 = 1e-6;
+
 impl Clock {
+    /// The number of rows whose time lies between, s from the first.
+    pub(super) fn rows_between(&self, from: f64, to: f64) -> usize {
+        let first = self.t.first().copied().unwrap_or_default();
+        let inside = |t: &&f64| (from - SLACK..=to + SLACK).contains(&(*t - first));
+        self.t.iter().filter(inside).count()
+    }
+
     /// The rows whose time lies between, s from the first.
     pub(super) fn between(self, [from, to]: [Option<f64>; 2], path: &Path) -> Result<Clock> {
         let (Some(&first), true) = (self.t.first(), from.is_some() || to.is_some()) else {
             return Ok(self);
         };
         let (from, to) = (from.unwrap_or(0.0), to.unwrap_or(f64::INFINITY));
-        // stamps that are written with few digits
-        let slack = 1e-6;
         let inside: Vec<usize> = (0..self.t.len())
-            .filter(|&i| (from - slack..=to + slack).contains(&(self.t[i] - first)))
+            .filter(|&i| (from - SLACK..=to + SLACK).contains(&(self.t[i] - first)))
             .collect();
         if inside.len() < 8 {
             let last = self.t[self.t.len() - 1] - first;

@@ -2,7 +2,8 @@
 
 use super::{POSE, check_names, numbered};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::log::formats::{self, Format, Request, csv};
+use crate::log::clock::Clock;
+use crate::log::formats::{self, Format, Request, Skip, csv};
 use crate::log::layout::{Layout, Place, Time};
 use crate::log::{Purpose, Record, Table, merge};
 use crate::plant::Plant;
@@ -40,6 +41,22 @@ impl Reading {
             // by number: which one it is shows when all names are known
             Place::Number(_) => true,
         }) || layout.time.is_none()
+    }
+
+    /// Rows before the part that counts, where the time of a text tells them at a glance.
+    fn skip(&self) -> Option<Skip> {
+        let from = self.part[0].filter(|x| *x > 0.0)?;
+        let (place, factor) = match &self.layout {
+            None => (Place::Name("t".into()), 1.0),
+            Some(layout) => match &layout.time {
+                Some(Time::Column(place, Some(factor))) => (place.clone(), *factor),
+                _ => return None,
+            },
+        };
+        Some(Skip {
+            time: place,
+            before: from / factor,
+        })
     }
 }
 
@@ -96,8 +113,7 @@ impl Record {
         )
     }
 
-    /// The same, as an experiment states it, until `each` has enough. A record from several files, and one of which only
-    /// a part counts, comes as a whole.
+    /// The same, as an experiment states it, until `each` has enough. A record from several files comes as a whole.
     pub(crate) fn parts_as(
         paths: &[PathBuf],
         plant: &Plant,
@@ -107,7 +123,6 @@ impl Record {
         rows: usize,
         each: &mut dyn FnMut(Record) -> Result<ControlFlow<()>>,
     ) -> Result<()> {
-        const LEAST: usize = 64;
         if rows < LEAST {
             let message = format!("parts of {rows} rows are too short; take {LEAST} or more");
             return Err(Error::Argument(message));
@@ -115,23 +130,39 @@ impl Record {
         let [path] = paths else {
             return each(Self::read_as(paths, plant, purpose, period, reading)?).map(|_| ());
         };
-        if reading.part != [None; 2] || !formats::divides(path)? {
+        if !formats::divides(path)? {
             return each(Self::read_as(paths, plant, purpose, period, reading)?).map(|_| ());
         }
         let joints = plant.actuators();
         let (mut parts, mut still, mut enough) = (0, 0, false);
+        let mut window = Window::new(reading.part);
         let mut take = |table: Table| -> Result<ControlFlow<()>> {
+            let clock = Self::clock(&table, path);
+            let clock = match window.cut(clock, path)? {
+                Cut::Inside(clock) => clock,
+                Cut::Before => return Ok(ControlFlow::Continue(())),
+                Cut::Behind => {
+                    enough = true;
+                    return Ok(ControlFlow::Break(()));
+                }
+            };
             parts += 1;
+            let rows = match clock.keep.as_deref() {
+                Some([first, .., last]) => *first..*last + 1,
+                _ => 0..table.rows(),
+            };
             let moves = |k: usize| {
                 let column = table.find(&format!("q{}", k + 1));
-                column.is_some_and(|c| table.columns[c].windows(2).any(|w| w[0] != w[1]))
+                column.is_some_and(|c| {
+                    let rows = &table.columns[c][rows.clone()];
+                    rows.windows(2).any(|w| w[0] != w[1])
+                })
             };
             if !(0..joints.len()).any(moves) {
                 still += 1;
                 return Ok(ControlFlow::Continue(()));
             }
-            let (mut record, clock) =
-                Self::repaired(table, path, plant, purpose, period, [None; 2])?;
+            let (mut record, clock) = Self::repaired(table, clock, path, plant, purpose, period)?;
             record.put_on_grid(&clock)?;
             record.name = format!("{}[{parts}]", record.name);
             let next = each(record)?;
@@ -140,7 +171,8 @@ impl Record {
         };
         if own(paths, reading)? {
             let check = |table: &Table| check_names(table, &joints, path);
-            let (mut last, unknown) = csv::read_parts(path, &known, &check, rows, &mut take)?;
+            let (mut last, unknown) =
+                csv::read_parts(path, &known, &check, rows, reading.skip(), &mut take)?;
             if !last.columns.iter().all(Vec::is_empty) {
                 last.warnings.extend(unknown);
                 let _ = take(last)?;
@@ -151,17 +183,86 @@ impl Record {
                 format: reading.format,
                 topic: reading.topic.as_deref(),
                 wanted: &wanted,
+                skip: reading.skip(),
             };
             let mut layout = None;
             formats::read_parts(path, &request, rows, &mut |table, format| {
                 take(translate(table, format, plant, reading, &mut layout, path)?)
             })?;
         }
+        if parts == 0 {
+            return Err(window.empty(path));
+        }
         if !enough && still == parts {
             let message = format!("nothing moves in its {still} parts: no position changes");
             return Err(Error::file(path, "", message));
         }
         Ok(())
+    }
+}
+
+/// Rows of a part at least.
+const LEAST: usize = 64;
+
+/// What a part of a log has of the part of the record that counts.
+enum Cut {
+    /// these rows
+    Inside(Clock),
+    /// none, it comes before
+    Before,
+    /// none, and nor will those that follow
+    Behind,
+}
+
+/// The part of a record that counts, while the log is read in parts.
+struct Window {
+    /// s from the start of the record; infinite where nothing is said
+    ends: [f64; 2],
+    /// whether only a part counts
+    stated: bool,
+    /// of what was read: its end, s from the start, the last stamp, and the usual step
+    read: Option<[f64; 3]>,
+}
+
+impl Window {
+    fn new([from, to]: [Option<f64>; 2]) -> Self {
+        Window {
+            ends: [from.unwrap_or(0.0), to.unwrap_or(f64::INFINITY)],
+            stated: from.is_some() || to.is_some(),
+            read: None,
+        }
+    }
+
+    /// Cuts the next part of the log. Fewer rows than a part has are left out.
+    fn cut(&mut self, clock: Clock, path: &Path) -> Result<Cut> {
+        let (true, [first, .., last]) = (self.stated, &clock.t[..]) else {
+            return Ok(Cut::Inside(clock));
+        };
+        // stamps that do not go on are followed as those within a log are
+        let start = self.read.map_or(0.0, |[end, before, step]| {
+            let ahead = first - before;
+            end + if ahead > 0.0 { ahead } else { step }
+        });
+        self.read = Some([start + (last - first), *last, clock.step]);
+        let [from, to] = self.ends.map(|x| x - start);
+        if to < 0.0 {
+            return Ok(Cut::Behind);
+        }
+        match clock.rows_between(from, to) {
+            n if n < LEAST => Ok(Cut::Before),
+            n if n == clock.t.len() => Ok(Cut::Inside(clock)),
+            _ => clock.between([Some(from), Some(to)], path).map(Cut::Inside),
+        }
+    }
+
+    /// That nothing of the log counts.
+    fn empty(&self, path: &Path) -> Error {
+        let [from, to] = self.ends;
+        let length = self.read.map_or(0.0, |r| r[0]);
+        let message = format!(
+            "fewer than {LEAST} samples lie between {from} s and {to} s of the record, which is {length:.3} s long"
+        );
+        Error::file(path, "", message)
     }
 }
 
@@ -203,6 +304,7 @@ fn foreign(paths: &[PathBuf], plant: &Plant, reading: &Reading) -> Result<Table>
             format: reading.format,
             topic: reading.topic.as_deref(),
             wanted: if paths.len() > 1 { &|_| true } else { &wanted },
+            skip: None,
         };
         parts.push((path.clone(), formats::read(path, &request)?));
     }
