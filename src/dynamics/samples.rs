@@ -26,9 +26,11 @@ impl Samples {
     /// If there is no such sample.
     pub fn select(&self, at: &[usize]) -> Self {
         let rows = |x: &[f64]| -> Vec<f64> {
-            let rows = x.chunks_exact(self.count.max(1));
-            rows.flat_map(|row| at.iter().map(move |&i| row[i]))
-                .collect()
+            let mut out = Vec::with_capacity(self.dof * at.len());
+            for row in x.chunks_exact(self.count.max(1)) {
+                out.extend(at.iter().map(|&i| row[i]));
+            }
+            out
         };
         Samples {
             dof: self.dof,

@@ -16,10 +16,11 @@
 
 use super::breakaway;
 use super::cross_validation::FOLDS;
-use super::equations::{self, Equations};
-use super::factor::{Factor, Header, Part, columns_of};
-use super::linear;
-use super::method::{self, Estimate};
+use super::equations::{self, Equations, Fit};
+use super::factor::{self, Factor, Header, Part, columns_of};
+use super::linear::{self, Weights};
+use super::merge;
+use super::method;
 use super::settings::{Method, Settings};
 use super::stack::Stack;
 use super::uncertainty;
@@ -63,14 +64,17 @@ pub fn condense(
         asked,
         records,
         &settings,
+        true,
         warnings,
     )
 }
 
-/// The same of records without payload, for the fit or not, with a cut-off that is chosen.
+/// The same of records without payload, for the fit or not, with a cut-off that is chosen; `correlated` says whether the
+/// variance through correlation in time is looked for.
 ///
 /// # Errors
 /// As [`condense`].
+#[allow(clippy::too_many_arguments)]
 pub(super) fn of_records(
     plant: &Plant,
     base: &BaseParameters,
@@ -78,32 +82,49 @@ pub(super) fn of_records(
     asked: Option<&[String]>,
     records: Vec<&Record>,
     settings: &Settings,
+    correlated: bool,
     mut warnings: Vec<Warning>,
 ) -> Result<Factor> {
     let all = Equations::new(plant, base, &settings.signals, records)?;
     warnings.extend(all.prepared.iter().flat_map(|p| p.warnings.clone()));
-    let mut fitted: Vec<Stack> = Vec::new();
-    let mut estimate = None;
+    let (mut a, mut folds) = part(&[], FOLDS);
     if all.records.iter().any(|r| r.purpose == Purpose::Fit) {
         let mut fit = all.fit()?;
         warnings.extend(fit.unit_suspicions());
         fit.keep_moving(&mut warnings)?;
-        let found = method::estimate(&mut fit, Method::Wls, &mut warnings)?;
-        // the estimate from all records is that of the only one
-        estimate = (all.records.len() == 1).then_some(found);
-        fitted = fit.into_stacks();
+        let known = base.count();
+        let condensed = |fit: &Fit| -> Result<(Part, Vec<Mat<f64>>, Stack, merge::Estimate)> {
+            let (a, folds) = part(&fit.stacks(), FOLDS);
+            let columns = columns_of(&a, &linear::factor(&folds));
+            let rows = factor::equations(&a, Purpose::Fit, known, &columns);
+            let found = merge::estimate(&rows, &a, Method::Wls)?;
+            Ok((a, folds, rows, found))
+        };
+        let mut found = condensed(&fit)?;
+        if fit.set_aside(&found.3.pi, &mut warnings)? {
+            found = condensed(&fit)?;
+        }
+        let (rows, estimate);
+        (a, folds, rows, estimate) = found;
+        let stacks = fit.stacks();
+        for s in stacks.iter().filter(|_| correlated) {
+            let inflation = match stacks.len() {
+                // the estimate from all records is that of the only one
+                1 => inflation(s, &estimate.weights, &estimate.pi, &rows)?,
+                _ => {
+                    let own = method::of_stacks(&[s], Method::Wls)?;
+                    inflation(s, &own.weights, &own.pi, s)?
+                }
+            };
+            a.inflated += s.equations() as f64 * inflation;
+        }
     }
-    let others: Vec<Stack> = all
+    let others: Vec<&Stack> = all
         .stacks
         .iter()
         .filter(|s| s.purpose != Purpose::Fit)
-        .cloned()
         .collect();
-    let (mut a, folds) = part(&fitted, FOLDS)?;
-    for s in &fitted {
-        a.inflated += s.equations() as f64 * inflation(s, estimate.take())?;
-    }
-    let (b, tests) = part(&others, 1)?;
+    let (b, tests) = part(&others, 1);
     let alone = [(&a, &folds), (&b, &tests)].map(|(part, each)| {
         let of = |m: &Mat<f64>| columns_of(part, m).iter().map(triangle).collect();
         each.iter().map(of).collect()
@@ -133,15 +154,15 @@ fn triangle(columns: &Mat<f64>) -> Mat<f64> {
 }
 
 /// What is said of records, and the factor of each fold.
-fn part(stacks: &[Stack], folds: usize) -> Result<(Part, Vec<Mat<f64>>)> {
+fn part(stacks: &[&Stack], folds: usize) -> (Part, Vec<Mat<f64>>) {
     let n = stacks.first().map_or(0, |s| s.actuators);
     let b = stacks.first().map_or(0, |s| s.w.ncols());
-    let right: Vec<Vec<f64>> = stacks.iter().map(Stack::tau).collect();
+    let right: Vec<Vec<f64>> = stacks.iter().map(|s| s.tau()).collect();
     let mut columns = Vec::new();
     for a in 0..n {
         for c in 0..b {
             let holds = |s: &Stack| (a * s.count..(a + 1) * s.count).any(|i| s.w[(i, c)] != 0.0);
-            if stacks.iter().any(holds) {
+            if stacks.iter().copied().any(holds) {
                 columns.push([a, c]);
             }
         }
@@ -150,7 +171,7 @@ fn part(stacks: &[Stack], folds: usize) -> Result<(Part, Vec<Mat<f64>>)> {
     let k = columns.len();
     let mut out = Vec::new();
     for f in 0..folds {
-        let mut sum = Mat::<f64>::zeros(k, k);
+        let mut sum: Option<Mat<f64>> = None;
         for (r, s) in stacks.iter().enumerate() {
             let (from, to) = (f * s.count / folds, (f + 1) * s.count / folds);
             for start in (from..to).step_by((CHUNK * k).max(1)) {
@@ -169,10 +190,11 @@ fn part(stacks: &[Stack], folds: usize) -> Result<(Part, Vec<Mat<f64>>)> {
                         }
                     }
                 }
-                sum = linear::factor(&[sum, rows]);
+                let both: Vec<Mat<f64>> = sum.into_iter().chain([rows]).collect();
+                sum = Some(linear::factor(&both));
             }
         }
-        out.push(sum);
+        out.push(sum.unwrap_or_else(|| Mat::zeros(k, k)));
     }
     let sums = |f: &dyn Fn(&Stack, usize) -> f64, join: fn(f64, f64) -> f64| -> Vec<f64> {
         let each = |a: usize| stacks.iter().map(|s| f(s, a)).fold(0.0, join);
@@ -193,18 +215,14 @@ fn part(stacks: &[Stack], folds: usize) -> Result<(Part, Vec<Mat<f64>>)> {
         }),
         inflated: 0.0,
     };
-    Ok((part, out))
+    (part, out)
 }
 
-/// Variance through correlation in time of a record alone, whose estimate may be known.
-fn inflation(stack: &Stack, known: Option<Estimate>) -> Result<f64> {
-    let one = [stack];
-    let estimate = match known {
-        Some(estimate) => estimate,
-        None => method::of_stacks(&one, Method::Wls)?,
-    };
-    let factor = linear::factor(&linear::fold_factors(&one, &estimate.weights, 1));
+/// Variance through correlation in time of a record, with its estimate, and equations that are as good as its own for all
+/// that does not depend on their order.
+fn inflation(stack: &Stack, weights: &Weights, pi: &[f64], rows: &Stack) -> Result<f64> {
+    let factor = linear::factor(&linear::fold_factors(&[rows], weights, 1));
     let r = linear::solve(factor.as_ref())?.r;
-    let found = uncertainty::covariance(&one, &estimate.weights, &estimate.pi, r.as_ref())?;
+    let found = uncertainty::covariance(&[stack], weights, pi, r.as_ref())?;
     Ok(found.inflation.max(1.0))
 }

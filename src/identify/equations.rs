@@ -161,11 +161,6 @@ impl Fit<'_> {
         self.stacks.iter().map(Cow::as_ref).collect()
     }
 
-    /// The equations themselves.
-    pub fn into_stacks(self) -> Vec<Stack> {
-        self.stacks.into_iter().map(Cow::into_owned).collect()
-    }
-
     /// Number of equations that count.
     pub fn equations(&self) -> usize {
         self.stacks.iter().map(|s| s.equations()).sum()

@@ -231,34 +231,39 @@ impl Factor {
         folds.iter().map(|f| self.equations(purpose, f)).collect()
     }
 
-    /// Rows of each actuator, with zeros below where others have more.
     fn equations(&self, purpose: usize, of: &[Mat<f64>]) -> Stack {
+        let known = self.header.names.len();
         let part = &self.header.parts[purpose];
-        let (n, b) = (part.used.len(), self.header.names.len());
-        let count = of.iter().map(Mat::nrows).max().unwrap_or(0);
-        let mut s = Stack {
-            name: part.records.join(", "),
-            purpose: [Purpose::Fit, Purpose::Holdout][purpose],
-            actuators: n,
-            count,
-            rate: 0.0,
-            stands_for: 1.0,
-            time: Vec::new(),
-            w: Mat::zeros(n * count, b),
-            measured: vec![0.0; n * count],
-            known: vec![0.0; n * count],
-            left_out: vec![false; n * count],
-        };
-        for (a, m) in of.iter().enumerate() {
-            for (j, [_, c]) in only(&part.columns, a).into_iter().enumerate() {
-                for i in 0..m.nrows() {
-                    match c < b {
-                        true => s.w[(a * count + i, c)] = m[(i, j)],
-                        false => s.measured[a * count + i] = m[(i, j)],
-                    }
+        equations(part, [Purpose::Fit, Purpose::Holdout][purpose], known, of)
+    }
+}
+
+/// Rows of each actuator of a part, with zeros below where others have more, for so many base parameters.
+pub(super) fn equations(part: &Part, purpose: Purpose, b: usize, of: &[Mat<f64>]) -> Stack {
+    let n = part.used.len();
+    let count = of.iter().map(Mat::nrows).max().unwrap_or(0);
+    let mut s = Stack {
+        name: part.records.join(", "),
+        purpose,
+        actuators: n,
+        count,
+        rate: 0.0,
+        stands_for: 1.0,
+        time: Vec::new(),
+        w: Mat::zeros(n * count, b),
+        measured: vec![0.0; n * count],
+        known: vec![0.0; n * count],
+        left_out: vec![false; n * count],
+    };
+    for (a, m) in of.iter().enumerate() {
+        for (j, [_, c]) in only(&part.columns, a).into_iter().enumerate() {
+            for i in 0..m.nrows() {
+                match c < b {
+                    true => s.w[(a * count + i, c)] = m[(i, j)],
+                    false => s.measured[a * count + i] = m[(i, j)],
                 }
             }
         }
-        s
     }
+    s
 }

@@ -23,8 +23,30 @@ type Function = fn(f64, f64) -> f64;
 /// residual, beyond what functions of its own velocity do. The shares below a tenth are left out.
 pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
     let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
+    let fitted: Vec<&Trace> = (traces.iter())
+        .filter(|t| t.purpose == Purpose::Fit)
+        .collect();
+    let count: usize = fitted.iter().map(|t| t.time.len()).sum();
+    let all = |of: &dyn Fn(&Trace, usize) -> f64| -> Vec<f64> {
+        let mut out = Vec::with_capacity(count);
+        for t in &fitted {
+            out.extend((0..t.time.len()).map(|k| of(t, k)));
+        }
+        out
+    };
     let mut out = Vec::new();
     for a in 0..names.len() {
+        let at = |t: &Trace, k: usize| a * t.time.len() + k;
+        let e = all(&|t, k| t.measured[at(t, k)] - t.predicted[at(t, k)]);
+        let power: f64 = e.iter().map(|v| v * v).sum();
+        // its own mean, velocity and direction
+        let own = all(&|t, k| t.velocity[at(t, k)]);
+        let direction = own.iter().map(|x| sign(*x)).collect();
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        for mut x in [vec![1.0; count], own.clone(), direction] {
+            free(&mut x, &basis);
+            basis.push(x);
+        }
         let mut best: Option<Follower> = None;
         for b in (0..names.len()).filter(|b| *b != a) {
             let functions: [(String, Function); 4] = [
@@ -41,36 +63,12 @@ pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
                     |x, y| (x - y).signum(),
                 ),
             ];
+            let other = all(&|t, k| t.velocity[b * t.time.len() + k]);
             for (what, f) in functions {
-                // f and residual, both without their own velocity, direction and mean
-                let (mut g, mut e, mut own) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
-                for t in traces.iter().filter(|t| t.purpose == Purpose::Fit) {
-                    let n = t.time.len();
-                    for k in 0..n {
-                        let (x, y) = (t.velocity[a * n + k], t.velocity[b * n + k]);
-                        g.push(f(x, y));
-                        e.push(t.measured[a * n + k] - t.predicted[a * n + k]);
-                        own[0].push(x);
-                        own[1].push(sign(x));
-                    }
-                }
-                let [x, s] = own;
-                let power: f64 = e.iter().map(|v| v * v).sum();
-                let mut list = [vec![1.0; e.len()], x, s, g];
-                // Gram-Schmidt; what is left of the last explains what is left of the residual
-                for i in 0..4 {
-                    let (before, rest) = list.split_at_mut(i);
-                    for q in before.iter() {
-                        let c: f64 = q.iter().zip(&rest[0]).map(|(p, r)| p * r).sum();
-                        rest[0].iter_mut().zip(q).for_each(|(r, p)| *r -= c * p);
-                    }
-                    let norm = rest[0].iter().map(|v| v * v).sum::<f64>().sqrt();
-                    let small = norm <= 1e-6 * (e.len() as f64).sqrt();
-                    rest[0]
-                        .iter_mut()
-                        .for_each(|r| *r = if small { 0.0 } else { *r / norm });
-                }
-                let c: f64 = list[3].iter().zip(&e).map(|(p, r)| p * r).sum();
+                // what is left of the function explains what is left of the residual
+                let mut g: Vec<f64> = own.iter().zip(&other).map(|(x, y)| f(*x, *y)).collect();
+                free(&mut g, &basis);
+                let c: f64 = g.iter().zip(&e).map(|(p, r)| p * r).sum();
                 let share = c * c / power.max(1e-300);
                 if share > 0.1 && best.as_ref().is_none_or(|f| share > f.share) {
                     best = Some(Follower {
@@ -85,4 +83,16 @@ pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
         out.extend(best);
     }
     out
+}
+
+/// Frees a signal of those of an orthonormal basis, and makes it as long as they are; one of which nothing is left is zero.
+fn free(x: &mut [f64], basis: &[Vec<f64>]) {
+    for q in basis {
+        let c: f64 = q.iter().zip(&*x).map(|(p, r)| p * r).sum();
+        x.iter_mut().zip(q).for_each(|(r, p)| *r -= c * p);
+    }
+    let norm = x.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let small = norm <= 1e-6 * (x.len() as f64).sqrt();
+    x.iter_mut()
+        .for_each(|r| *r = if small { 0.0 } else { *r / norm });
 }

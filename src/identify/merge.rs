@@ -194,15 +194,15 @@ fn covariance_of(fitted: &Stack, part: &Part, pi: &[f64]) -> Mat<f64> {
 }
 
 /// Base parameters and what they were weighted with.
-struct Estimate {
-    weights: Weights,
+pub(super) struct Estimate {
+    pub weights: Weights,
     /// of each actuator alone, as the folds need them
-    alone: Weights,
-    pi: Vec<f64>,
+    pub alone: Weights,
+    pub pi: Vec<f64>,
 }
 
 /// As the estimators of [`super::method`], step by step.
-fn estimate(fitted: &Stack, part: &Part, method: Method) -> Result<Estimate> {
+pub(super) fn estimate(fitted: &Stack, part: &Part, method: Method) -> Result<Estimate> {
     let n = part.used.len();
     let solve = |w: &Weights| -> Result<Vec<f64>> {
         let factor = linear::factor(&linear::fold_factors(&[fitted], w, 1));

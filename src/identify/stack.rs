@@ -100,27 +100,30 @@ impl Stack {
                         }
                     }
                 }
-                let (known, whole) = match thin {
-                    None => (plant.known_torque(&part)?, count),
+                let known = match thin {
+                    None => plant.known_torque(&part)?,
                     Some((_, jumps)) => {
                         let inputs = p.filter.inputs(range.clone());
-                        let part = motion.select(&inputs);
                         for (c, to) in out.w.chunks_exact_mut(n * outputs).enumerate() {
-                            let Some((_, joint)) = jumps.iter().find(|j| j.0 == base.kept[c])
-                            else {
-                                continue;
-                            };
-                            let speeds = &part.qd[joint * part.count..][..part.count];
-                            let signs: Vec<f64> = speeds.iter().map(|x| sign(*x)).collect();
-                            let to = &mut to[joint * outputs..(joint + 1) * outputs];
-                            p.filter.apply_part(&signs, range.clone(), to);
+                            let jump = jumps.iter().find(|j| j.0 == base.kept[c]);
+                            if let Some((_, joint)) = jump {
+                                let speeds = &motion.qd[joint * motion.count..][..motion.count];
+                                let signs = inputs.iter().map(|&i| sign(speeds[i]));
+                                let signs: Vec<f64> = signs.collect();
+                                let to = &mut to[joint * outputs..(joint + 1) * outputs];
+                                p.filter.apply_part(&signs, range.clone(), to);
+                            }
                         }
-                        (plant.known_torque(&part)?, part.count)
+                        match plant.knows_terms() {
+                            true => plant.known_torque(&motion.select(&inputs))?,
+                            false => Vec::new(),
+                        }
                     }
                 };
-                for a in 0..n {
-                    let from = &known[a * whole..(a + 1) * whole];
-                    let to = &mut out.known[a * outputs..(a + 1) * outputs];
+                let whole = known.len() / n;
+                for (from, to) in (known.chunks_exact(whole.max(1)))
+                    .zip(out.known.chunks_exact_mut(outputs.max(1)))
+                {
                     p.filter.apply_part(from, range.clone(), to);
                 }
                 Ok(out)

@@ -9,10 +9,10 @@ use crate::plant::Plant;
 pub fn suspicions(plant: &Plant, base: &BaseParameters, fit: &[&Stack]) -> Vec<Warning> {
     let pi = base.project(&plant.values());
     let mut out = Vec::new();
+    let predictions: Vec<Vec<f64>> = fit.iter().map(|s| s.predicted(&pi)).collect();
     for (a, joint) in plant.actuators().iter().enumerate() {
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-        for s in fit {
-            let predicted = s.predicted(&pi);
+        for (s, predicted) in fit.iter().zip(&predictions) {
             let range = a * s.count..(a + 1) * s.count;
             for k in range {
                 let (x, y) = (predicted[k], s.measured[k]);

@@ -65,7 +65,11 @@ fn turns(record: &Prepared, a: usize, speed: &[f64]) -> Result<Vec<(usize, Vec<f
         .flat_map(|q| q.iter().zip(&middle).map(|(q, m)| q - m))
         .collect();
     let (rate, order) = (record.rate, Settings::default().order);
-    let low = smoother(order, cutoff::aperiodic(&off, rate, order).frequency, rate)?;
+    let low = smoother(
+        order,
+        cutoff::aperiodic(&off, rate, order, usize::MAX).frequency,
+        rate,
+    )?;
     let rates = first_derivative(&low(&off), 1.0 / rate);
     let near = |(i, v): (usize, &f64)| {
         let each = (0..p.count).map(|k| rates[k * n + i]);

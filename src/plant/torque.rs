@@ -118,6 +118,14 @@ impl Plant {
         Ok(rest.collect())
     }
 
+    /// Whether [`Plant::known_torque`] of a tree is anything but zero.
+    pub(crate) fn knows_terms(&self) -> bool {
+        self.robot.joints.iter().any(|joint| {
+            let terms = joint.terms.iter().zip(joint.identify);
+            joint.stribeck.force != 0.0 || terms.into_iter().any(|(x, asked)| *x != 0.0 && !asked)
+        })
+    }
+
     /// Torque of the terms of a tree's joints that are not identified: no difference of nearly
     /// equal numbers.
     fn known_terms(&self, x: &Samples) -> Vec<f64> {

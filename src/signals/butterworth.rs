@@ -67,21 +67,15 @@ impl Butterworth {
         3 * (2 * self.sections.len() + 1 - self.order % 2)
     }
 
-    /// One pass in place, starting in the steady state of a constant input `x0`.
-    fn pass(&self, x: &mut [f64]) {
-        let Some(&x0) = x.first() else { return };
-        // gain 1 at zero frequency: every section sees the same constant
-        for s in &self.sections {
-            let [b0, b1, b2] = s.b;
-            let [a1, a2] = s.a;
-            let mut z2 = (b2 - a2) * x0;
-            let mut z1 = (b1 - a1) * x0 + z2;
-            for v in x.iter_mut() {
-                let y = b0 * *v + z1;
-                z1 = b1 * *v - a1 * y + z2;
-                z2 = b2 * *v - a2 * y;
-                *v = y;
-            }
+    /// One pass in place, `back` from the end to the beginning, starting in the steady state of a constant input: the first
+    /// sample.
+    fn pass(&self, x: &mut [f64], back: bool) {
+        let first = if back { x.last() } else { x.first() };
+        let Some(&x0) = first else { return };
+        match self.sections[..] {
+            // the usual number, side by side
+            [a, b] => pass([a, b], x, x0, back),
+            _ => self.sections.iter().for_each(|s| pass([*s], x, x0, back)),
         }
     }
 
@@ -96,11 +90,32 @@ impl Butterworth {
         y.extend((1..=pad).rev().map(|i| 2.0 * x[0] - x[i]));
         y.extend_from_slice(x);
         y.extend((1..=pad).map(|i| 2.0 * x[n - 1] - x[n - 1 - i]));
-        self.pass(&mut y);
-        y.reverse();
-        self.pass(&mut y);
-        y.reverse();
-        y[pad..pad + n].to_vec()
+        self.pass(&mut y, false);
+        self.pass(&mut y, true);
+        y.truncate(pad + n);
+        y.drain(..pad);
+        y
+    }
+}
+
+/// A sample passes all of these sections before the next one does; they start as if the input had been `x0` for ever.
+fn pass<const N: usize>(sections: [Section; N], x: &mut [f64], x0: f64, back: bool) {
+    // gain 1 at zero frequency: every section sees the same constant
+    let mut states = sections.map(|Section { b, a }| {
+        let z2 = (b[2] - a[1]) * x0;
+        [(b[1] - a[0]) * x0 + z2, z2]
+    });
+    let mut take = |v: &mut f64| {
+        for (z, Section { b, a }) in states.iter_mut().zip(&sections) {
+            let y = b[0] * *v + z[0];
+            z[0] = b[1] * *v - a[0] * y + z[1];
+            z[1] = b[2] * *v - a[1] * y;
+            *v = y;
+        }
+    };
+    match back {
+        false => x.iter_mut().for_each(&mut take),
+        true => x.iter_mut().rev().for_each(&mut take),
     }
 }
 

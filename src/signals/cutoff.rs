@@ -1,6 +1,6 @@
 //! The cut-off of the positions, from their spectrum.
 
-use super::fourier::{Plan, welch};
+use super::fourier::{Plan, welch, welch_of};
 use realfft::num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -48,10 +48,15 @@ fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
 }
 
 /// Spectrum of a position, one-sided, units²/Hz: that of its first difference, which has no trend to
-/// leak, divided by the difference's own.
-pub(super) fn spectrum_of(q: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
+/// leak, divided by the difference's own. Of a long signal no more than so many windows are looked at.
+pub(super) fn spectrum_of(
+    q: &[f64],
+    rate: f64,
+    length: usize,
+    windows: usize,
+) -> (Vec<f64>, Vec<f64>) {
     let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
-    let (f, mut density) = welch(&difference, rate, length);
+    let (f, mut density) = welch_of(&difference, rate, length, windows);
     for (f, d) in f.iter().zip(&mut density) {
         let gain = 2.0 * (PI * f / rate).sin();
         *d /= (gain * gain).max(1e-300);
@@ -61,8 +66,9 @@ pub(super) fn spectrum_of(q: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec
 }
 
 /// Noise floor of a channel, units²/Hz: the median of its spectrum between 0.3 and 0.45 of the rate.
-pub fn floor(q: &[f64], rate: f64) -> f64 {
-    let (f, density) = spectrum_of(q, rate, (rate as usize).clamp(64, (q.len() / 2).max(64)));
+pub fn floor(q: &[f64], rate: f64, windows: usize) -> f64 {
+    let length = (rate as usize).clamp(64, (q.len() / 2).max(64));
+    let (f, density) = spectrum_of(q, rate, length, windows);
     noise_floor(&f, &density, rate)
 }
 
@@ -108,10 +114,10 @@ pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
 /// `order` is that of one pass of the Butterworth filter, whose gain `1/(1 + (f/f_c)^{2N})` decides what
 /// passes. What is lost of the signal is the same in every sample and does not average out in the
 /// estimate as noise does; it counts a hundredfold.
-pub fn aperiodic(q: &[f64], rate: f64, order: usize) -> Cutoff {
+pub fn aperiodic(q: &[f64], rate: f64, order: usize, windows: usize) -> Cutoff {
     // a tenth of a hertz to resolve the motion, and at least four windows to average
     let length = ((10.0 * rate) as usize).clamp(64, (q.len() / 2).max(64));
-    let (f, density) = spectrum_of(q, rate, length);
+    let (f, density) = spectrum_of(q, rate, length, windows);
     let largest = density.iter().cloned().fold(0.0, f64::max);
     let floor = noise_floor(&f, &density, rate).max(ROUNDING * largest);
     // a line of noise here and there is no signal: means over neighbours decide
@@ -137,13 +143,20 @@ pub fn aperiodic(q: &[f64], rate: f64, order: usize) -> Cutoff {
     let (low, high) = (f.get(2).copied().unwrap_or(0.0), 0.3 * rate);
     let mut best = (f64::INFINITY, high);
     let mut cutoff = high;
+    // in units of the highest, so that no power is beyond what a number holds
+    let power = |f: f64| (f / high).powi(2 * order as i32);
+    let lines: Vec<[f64; 3]> = (f.iter().zip(&signal).skip(1))
+        .map(|(f, signal)| [power(*f), f.powi(4) * floor, f.powi(4) * BIAS * signal])
+        .collect();
     while cutoff > low && low > 0.0 {
-        let mut error = 0.0;
-        for (f, signal) in f.iter().zip(&signal).skip(1) {
-            let gain = 1.0 / (1.0 + (f / cutoff).powi(2 * order as i32));
-            let w4 = f.powi(4);
-            error += w4 * (gain * gain * floor + BIAS * (1.0 - gain).powi(2) * signal);
-        }
+        let own = power(cutoff);
+        // gain c/(c + x) and what it leaves out, x/(c + x)
+        let error: f64 = (lines.iter())
+            .map(|[x, noise, signal]| {
+                let all = own + x;
+                (own * own * noise + x * x * signal) / (all * all)
+            })
+            .sum();
         if error < best.0 {
             best = (error, cutoff);
         }

@@ -166,20 +166,32 @@ impl Decimator {
         );
         let m = self.reach();
         let inner = Inner::new();
-        for (y, &i) in out.iter_mut().zip(&self.at) {
-            *y = match i >= m && i + m < x.len() {
-                true => inner.one(&self.kernel, &x[i - m..=i + m]),
-                // only where the signal repeats
-                false => {
-                    let n = x.len();
-                    let wrapped = |k: usize| x[(i + n * (m / n + 1) + k - m) % n];
-                    self.kernel
-                        .iter()
-                        .enumerate()
-                        .map(|(k, w)| w * wrapped(k))
-                        .sum()
-                }
-            };
+        let whole = |i: usize| i >= m && i + m < x.len();
+        for (y, at) in out.chunks_mut(AT_ONCE).zip(self.at.chunks(AT_ONCE)) {
+            if let [a, b, c, d] = *at
+                && whole(a)
+                && whole(d)
+            {
+                let part = |i: usize| &x[i - m..=i + m];
+                let parts = [part(a), part(b), part(c), part(d)];
+                y.copy_from_slice(&inner.four(&self.kernel, parts));
+                continue;
+            }
+            for (y, &i) in y.iter_mut().zip(at) {
+                *y = match whole(i) {
+                    true => inner.one(&self.kernel, &x[i - m..=i + m]),
+                    // only where the signal repeats
+                    false => {
+                        let n = x.len();
+                        let wrapped = |k: usize| x[(i + n * (m / n + 1) + k - m) % n];
+                        self.kernel
+                            .iter()
+                            .enumerate()
+                            .map(|(k, w)| w * wrapped(k))
+                            .sum()
+                    }
+                };
+            }
         }
     }
 

@@ -84,6 +84,11 @@ pub fn derivatives(x: &[f64], period: f64, highest: usize) -> [Vec<f64>; 3] {
 /// Power spectral density (one-sided, units²/Hz) by Welch's method: Hann windows of `length`
 /// samples that overlap by half, means removed. Returns frequencies and densities.
 pub fn welch(x: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
+    welch_of(x, rate, length, usize::MAX)
+}
+
+/// The same of no more than so many windows, evenly spread over a long signal.
+pub fn welch_of(x: &[f64], rate: f64, length: usize, most: usize) -> (Vec<f64>, Vec<f64>) {
     let n = length.min(x.len()).max(2);
     let window: Vec<f64> = (0..n)
         .map(|i| 0.5 - 0.5 * (2.0 * PI * i as f64 / n as f64).cos())
@@ -92,19 +97,22 @@ pub fn welch(x: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
     let plan = Plan::new(n);
     let bins = n / 2 + 1;
     let mut sum = vec![0.0; bins];
-    let mut count = 0;
-    let mut start = 0;
-    while start + n <= x.len() {
+    let step = (n / 2).max(1);
+    let all = match x.len() >= n {
+        true => (x.len() - n) / step + 1,
+        false => 0,
+    };
+    let count = all.min(most.max(1));
+    for k in 0..count {
+        let start = k * all / count * step;
         let part = &x[start..start + n];
         let mean = part.iter().sum::<f64>() / n as f64;
         let z = part.iter().zip(&window).map(|(v, w)| (v - mean) * w);
         for (s, c) in sum.iter_mut().zip(plan.spectrum(z.collect())) {
             *s += c.norm_sqr();
         }
-        count += 1;
-        start += (n / 2).max(1);
     }
-    let scale = 2.0 / (rate * power * f64::from(count.max(1)));
+    let scale = 2.0 / (rate * power * count.max(1) as f64);
     let frequencies = (0..bins).map(|k| k as f64 * rate / n as f64).collect();
     (frequencies, sum.into_iter().map(|s| s * scale).collect())
 }

@@ -70,8 +70,8 @@ pub struct Settings {
     pub average: bool,
     /// whether measured velocities and accelerations are used where the log has them
     pub measured_rates: bool,
-    /// whether the columns of the regressor that have no jumps are computed at fewer samples, where the low-pass of the
-    /// positions leaves them nothing in between: for long logs of trees ([`Thin`])
+    /// for long logs: whether the columns of the regressor that have no jumps are computed at fewer samples, where the
+    /// low-pass of the positions leaves them nothing in between ([`Thin`]; trees), and spectra from a few windows
     pub thin: bool,
     /// whether the pose columns give the coordinates of a parallel robot, instead of its actuators
     pub measured_pose: bool,

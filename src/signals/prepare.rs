@@ -9,6 +9,8 @@ use crate::plant::{self, Plant};
 use faer::Mat;
 use rayon::prelude::*;
 
+/// Windows that say what the spectrum of a part of a long log is.
+const WINDOWS: usize = 16;
 /// Samples that hold a motion, in cut-offs of its positions.
 const DENSITY: f64 = 8.0;
 /// Cut-off of the parallel filter, in bandwidths of the motion.
@@ -71,6 +73,10 @@ impl Prepared {
 
     fn aperiodic(record: &Record, plant: &Plant, settings: &Settings) -> Result<Prepared> {
         let rate = record.rate();
+        let windows = match settings.thin {
+            true => WINDOWS,
+            false => usize::MAX,
+        };
         let x = coordinates(record, plant, settings)?;
         let measured = measured_rates(record, plant, settings, &x)?;
         let dq = measured.as_ref().map(|m| &m.velocity);
@@ -90,7 +96,7 @@ impl Prepared {
                 let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
                 let frequency = match settings.position_cutoff {
                     Some(f) => f,
-                    None => cutoff::aperiodic(q, rate, settings.order)
+                    None => cutoff::aperiodic(q, rate, settings.order, windows)
                         .frequency
                         .min(most)
                         .min(0.45 * rate),
@@ -125,13 +131,13 @@ impl Prepared {
         let frequencies: Vec<f64> = series.iter().map(|s| s.0).collect();
         let highest = frequencies.iter().cloned().fold(0.0, f64::max);
         let noise_of = |q: &Vec<f64>| {
-            let floor = cutoff::floor(q, rate);
+            let floor = cutoff::floor(q, rate, windows);
             cutoff::velocity_noise(floor, highest.min(0.5 * rate))
         };
         let velocity_noise = match dq.and(record.dq.as_ref()) {
             // as measured, at most up to half the rate
             Some(dq) => (dq.iter())
-                .map(|v| (cutoff::floor(v, rate) * highest.min(0.5 * rate)).sqrt())
+                .map(|v| (cutoff::floor(v, rate, windows) * highest.min(0.5 * rate)).sqrt())
                 .collect(),
             None => record.q.iter().map(noise_of).collect(),
         };

@@ -197,7 +197,7 @@ impl Filter {
     pub fn of(q: &[f64], variance: f64, dt: f64) -> Option<Filter> {
         let count = q.len();
         let length = ((STRETCH / dt) as usize).clamp(64, (count / 2).max(64));
-        let (f, density) = spectrum_of(q, 1.0 / dt, length);
+        let (f, density) = spectrum_of(q, 1.0 / dt, length, usize::MAX);
         let noise = 2.0 * variance * dt;
         let of = |k: usize| (1.0 - noise / density[k].max(1e-300)).max(0.0);
         // the first line is that of the trend
