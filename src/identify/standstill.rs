@@ -30,8 +30,9 @@ pub fn left_out(
     if dry.is_empty() {
         return Ok((None, None));
     }
-    let mut out: Vec<Stack> = fit.iter().map(|s| (*s).clone()).collect();
-    for (s, p) in out.iter_mut().zip(prepared) {
+    // most records have nothing to leave out
+    let mut changed: Option<Vec<Stack>> = None;
+    for (r, p) in prepared.iter().enumerate() {
         let motion = plant.drive_motion(&p.motion)?;
         for &a in &dry {
             let row = a * p.count()..(a + 1) * p.count();
@@ -41,17 +42,22 @@ pub fn left_out(
                 motion: joints[a].motion,
             };
             let slow = standstill::slow(joint, &motion.q[row.clone()], &motion.qd[row]);
-            let still: Vec<f64> = slow.into_iter().map(f64::from).collect();
-            if still.iter().all(|x| *x == 0.0) {
+            if !slow.contains(&true) {
                 continue;
             }
+            let still: Vec<f64> = slow.into_iter().map(f64::from).collect();
             for (k, share) in p.filter.apply(&still).into_iter().enumerate() {
                 if share > 0.5 {
-                    s.leave_out(a, k);
+                    let all =
+                        changed.get_or_insert_with(|| fit.iter().map(|s| (*s).clone()).collect());
+                    all[r].leave_out(a, k);
                 }
             }
         }
     }
+    let Some(out) = changed else {
+        return Ok((None, None));
+    };
     let named: Vec<String> = dry
         .iter()
         .filter_map(|&a| {

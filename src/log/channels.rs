@@ -30,13 +30,28 @@ pub struct Clipped {
     pub level: f64,
 }
 
+/// Samples of a run at the least that clipping is told by.
+const SHORTEST: usize = 5;
+
 /// Smallest and largest of the finite values; `[inf, -inf]` where there is none.
-fn extremes(y: &[f64]) -> [f64; 2] {
-    y.iter()
-        .filter(|x| x.is_finite())
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
-            [a.min(x), b.max(x)]
-        })
+pub(super) fn extremes(y: &[f64]) -> [f64; 2] {
+    /// Values that are compared side by side.
+    const WIDE: usize = 8;
+    let (mut low, mut high) = ([f64::INFINITY; WIDE], [f64::NEG_INFINITY; WIDE]);
+    let mut chunks = y.chunks_exact(WIDE);
+    let mut take = |k: usize, x: f64| {
+        let finite = x.abs() < f64::INFINITY;
+        low[k] = if finite && x < low[k] { x } else { low[k] };
+        high[k] = if finite && x > high[k] { x } else { high[k] };
+    };
+    for chunk in &mut chunks {
+        (0..WIDE).for_each(|k| take(k, chunk[k]));
+    }
+    chunks.remainder().iter().for_each(|x| take(0, *x));
+    [
+        low.into_iter().fold(f64::INFINITY, f64::min),
+        high.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    ]
 }
 
 /// The samples of a torque channel that stand at its largest or smallest value for long, as clipping makes them.
@@ -56,20 +71,24 @@ pub fn saturated(y: &[f64], effort: f64) -> Option<Clipped> {
         let near = |x: f64| (x - level).abs() <= 1e-9 * (high - low);
         // a run at the level, and not only of equal values, so that rounding does not hide it
         let mut found = Vec::new();
-        let mut i = 0;
-        while i < y.len() {
-            if !near(y[i]) {
-                i += 1;
+        // every run that is long enough holds one of these
+        let mut probe = SHORTEST - 1;
+        while probe < y.len() {
+            if !near(y[probe]) {
+                probe += SHORTEST;
                 continue;
             }
-            let length = y[i..].iter().take_while(|x| near(**x)).count();
-            if length >= 5 {
+            let before = y[..probe].iter().rev().take_while(|x| near(**x)).count();
+            let i = probe - before;
+            let length = before + y[probe..].iter().take_while(|x| near(**x)).count();
+            if length >= SHORTEST {
                 let usual = *usual.get_or_insert_with(|| median(runs(y).map(|r| r.len() as f64)));
                 if length as f64 >= 4.0 * usual {
                     found.push(i..i + length);
                 }
             }
-            i += length;
+            // the sample behind the run is not near
+            probe = i + length + SHORTEST;
         }
         let count: usize = found.iter().map(Range::len).sum();
         let at_limit = level.abs() >= 0.98 * effort && count > 0;

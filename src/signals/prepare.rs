@@ -411,20 +411,19 @@ fn coordinates(record: &Record, plant: &Plant, settings: &Settings) -> Result<Ve
 
 fn assemble(series: Vec<Rates>) -> Samples {
     let count = series.first().map_or(0, |s| s[0].len());
-    let mut out = Samples {
+    let all = |k: usize| {
+        let mut out = Vec::with_capacity(series.len() * count);
+        series.iter().for_each(|s| out.extend_from_slice(&s[k]));
+        out
+    };
+    let ([q, qd], qdd) = rayon::join(|| [all(0), all(1)], || all(2));
+    Samples {
         dof: series.len(),
         count,
-        ..Samples::default()
-    };
-    for x in [&mut out.q, &mut out.qd, &mut out.qdd] {
-        x.reserve_exact(series.len() * count);
+        q,
+        qd,
+        qdd,
     }
-    for [q, qd, qdd] in series {
-        out.q.extend(q);
-        out.qd.extend(qd);
-        out.qdd.extend(qdd);
-    }
-    out
 }
 
 /// Mean of signals of one length, sample by sample.

@@ -288,7 +288,12 @@ pub(super) fn first_rows(table: &mut Table, rows: usize) -> Table {
     Table {
         names: table.names.clone(),
         columns: columns
-            .map(|c| c.drain(..rows.min(c.len())).collect())
+            .map(|c| {
+                let mut rest = Vec::with_capacity(c.capacity());
+                rest.extend_from_slice(&c[rows.min(c.len())..]);
+                c.truncate(rows);
+                std::mem::replace(c, rest)
+            })
             .collect(),
         warnings: Vec::new(),
     }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result, Warning, WarningKind, counted};
 use crate::log::Record;
+use crate::log::channels::extremes;
 use crate::log::clock::{self, Clock};
 use rayon::prelude::*;
 use std::path::Path;
@@ -79,12 +80,14 @@ impl Record {
 /// Whether it shows without any sorting that no sample is far: where more than a hundredth of them lie in the lowest
 /// quarter of the range, and as many in the highest, the middle 98 % are at least half the range wide.
 fn none_is_far(y: &[f64]) -> bool {
-    let (mut low, mut high, mut finite) = (f64::INFINITY, f64::NEG_INFINITY, 0);
-    for &x in y.iter().filter(|x| !x.is_nan()) {
-        (low, high) = (low.min(x), high.max(x));
-        finite += 1;
+    // an infinite value is as far as can be
+    let beyond = y.iter().filter(|x| x.abs() > LARGEST).count();
+    if beyond > 0 {
+        return false;
     }
-    if !(low >= -LARGEST && high <= LARGEST) {
+    let finite = y.len() - y.iter().filter(|x| x.is_nan()).count();
+    let [low, high] = extremes(y);
+    if finite == 0 {
         return false;
     }
     let quarter = 0.25 * (high - low);
