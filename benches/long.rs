@@ -8,15 +8,15 @@
 //! Each in a process of its own, because the memory is the most of the process.
 
 use excite::diagnose::{Settings as Diagnosis, diagnose};
-use excite::identify::{Factor, Settings, condense, merge};
+use excite::identify::{Settings, condense_parts, identify_parts};
 use excite::log::parts::Purpose;
-use excite::log::{Experiment, Record, Table};
+use excite::log::{Experiment, Outline, Record, Table};
 use excite::robot::parts::JointTerm;
 use excite::simulate::parts::Sensors;
 use excite::simulate::{Settings as Simulation, measure, simulate, to_record};
 use excite::trajectory::Fourier;
 use excite::trajectory::parts::Series;
-use excite::{Plant, Result};
+use excite::{Plant, Result, survey};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -132,22 +132,13 @@ fn long(plant: &Plant, path: &Path, rows: usize) -> Result<(), Box<dyn std::erro
     said("read and checked in parts", start, size);
 
     let start = Instant::now();
-    let mut settings = Settings::default();
-    settings.signals.cutoff = Some(5.0);
-    settings.signals.thin = true;
-    let mut sum: Option<Factor> = None;
-    Record::read_parts(path, plant, Purpose::Fit, None, each, &mut |part| {
-        let next = condense(plant, "panda", None, &[part], &settings)?;
-        sum = Some(match sum.take() {
-            Some(all) => all.and_then(next)?,
-            None => next,
-        });
-        Ok(())
-    })?;
-    said("read and condensed in parts", start, size);
-    let start = Instant::now();
-    let model = merge(plant, sum.into_iter().collect(), &settings)?;
-    said("model from the factor", start, 0.0);
+    let outline = Outline::of_log(path, "panda", None)?;
+    let check = |part: &Record| survey::check(plant, std::slice::from_ref(part));
+    let settings = Settings::default();
+    let condensed = condense_parts(&outline, plant, None, each, &settings, &check)?;
+    said("read, checked and condensed in parts", start, size);
+    let model = identify_parts(plant, condensed)?;
+    said("the same with the model", start, size);
     println!(
         "{} base parameters, condition {:.0}",
         model.pi.len(),

@@ -207,3 +207,46 @@ pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
         })
         .flatten()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run at the highest value is found wherever it begins, and not where it is a sample short.
+    #[test]
+    fn a_channel_that_is_clipped_is_found_wherever_it_is() {
+        for (length, start) in (4..9).flat_map(|l| (0..40).map(move |s| (l, s))) {
+            let wave = |i: usize| (0.37 * i as f64).sin();
+            let mut y: Vec<f64> = (0..400).map(wave).collect();
+            let second = start + length + 1 + start % 7;
+            for from in [start, second] {
+                y[from..from + length].fill(3.0);
+            }
+            let found = saturated(&y, 100.0).map(|c| c.at);
+            let expected = vec![start..start + length, second..second + length];
+            assert_eq!(found, (length >= SHORTEST).then_some(expected), "{start}");
+        }
+    }
+
+    #[test]
+    fn extremes_are_those_of_the_finite_values() {
+        let mut y: Vec<f64> = (0..29).map(|i| (1.7 * i as f64).sin()).collect();
+        let naive = |y: &[f64]| {
+            let finite = || y.iter().copied().filter(|x| x.is_finite());
+            [
+                finite().fold(f64::INFINITY, f64::min),
+                finite().fold(f64::NEG_INFINITY, f64::max),
+            ]
+        };
+        for (at, value) in [
+            (3, f64::NAN),
+            (28, f64::INFINITY),
+            (9, f64::NEG_INFINITY),
+            (17, 9.0),
+        ] {
+            y[at] = value;
+            assert_eq!(extremes(&y), naive(&y));
+        }
+        assert_eq!(extremes(&[f64::NAN; 3]), [f64::INFINITY, f64::NEG_INFINITY]);
+    }
+}

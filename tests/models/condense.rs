@@ -227,7 +227,9 @@ fn an_experiment_in_parts_is_identified_from_all_of_its_rows() {
             .unwrap();
     }
     assert!(parts.len() > 5, "{}", parts.len());
-    let whole = identify(&plant, &parts, &settings).unwrap();
+    let mut thin = settings.clone();
+    thin.signals.thin = true;
+    let whole = identify(&plant, &parts, &thin).unwrap();
     println!("base parameters off by {:.1e}", off(&found.pi, &whole.pi));
     assert!(off(&found.pi, &whole.pi) < 1e-10);
     assert!(off(&found.predicted_std, &whole.predicted_std) < 1e-9);
@@ -263,6 +265,128 @@ fn an_experiment_in_parts_is_identified_from_all_of_its_rows() {
     settings.method = Method::Robust;
     let error = condensed(&settings).map(|_| ()).unwrap_err();
     assert!(error.to_string().contains("--rows 0"), "{error}");
+}
+
+/// Smooth columns of the regressor at fewer samples, and friction at all: the estimate stays where it is, to a small part of
+/// its standard deviation.
+#[test]
+fn fewer_samples_of_the_regressor_say_the_same() {
+    let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
+    for (robot, cutoff) in [("planar2", 4.0), ("scara", 3.0), ("ur5e", 3.0)] {
+        let plant = Plant::load(robot).unwrap().with_terms(&terms);
+        let motion = rehearse::within(&rehearse::motion(robot), 8.0);
+        let simulation = rehearse::simulation(Effects::default());
+        let run = simulate(&plant, &motion, 3, &simulation, &|_| {}).unwrap();
+        let sensors = Sensors::new(&plant, 1.0).0;
+        let measured = measure(&run, &sensors, &simulation.effects, 1);
+        let mut record = to_record(&run, &measured, Purpose::Fit, 8.0);
+        record.period = None;
+        let mut settings = settings(Method::Wls);
+        settings.signals.cutoff = Some(cutoff);
+        let all = identify(&plant, std::slice::from_ref(&record), &settings).unwrap();
+        settings.signals.thin = true;
+        let few = identify(&plant, &[record], &settings).unwrap();
+        let stride = few.prepared[0].thin.as_ref().unwrap().stride;
+        let apart = (few.pi.iter().zip(&all.pi).zip(&all.std))
+            .map(|((x, y), s)| (x - y).abs() / s)
+            .fold(0.0, f64::max);
+        let errors = [&few, &all].map(|id| id.validation.plain.0);
+        println!(
+            "{robot}: one sample of {stride}, {apart:.3} standard deviations apart, {errors:?}"
+        );
+        assert!(stride > 1 && apart < 0.3, "{robot}: {stride} {apart}");
+        assert!((errors[0] / errors[1] - 1.0).abs() < 0.02, "{errors:?}");
+    }
+}
+
+/// The answer does not depend on how many parts are worked on at a time.
+#[test]
+fn parts_side_by_side_are_parts_one_by_one() {
+    let plant = plant();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("day.csv");
+    write_csv(&path, &records(&plant)[0]);
+    let outline = Outline::of_log(&path, "planar2", None).unwrap();
+    let wls = settings(Method::Wls);
+    let of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let none = |_: &Record| Ok(Vec::new());
+        let condensed = || condense_parts(&outline, &plant, None, 700, &wls, &none).unwrap();
+        let found = pool.build().unwrap().install(condensed);
+        assert!(found.shares[0].parts > 3, "{}", found.shares[0].parts);
+        found.factor.to_bytes().unwrap()
+    };
+    assert!(of(1) == of(4));
+}
+
+/// Where only a part of a record counts, a log in parts has the rows of the log as a whole, whatever its clock: seconds,
+/// nanoseconds since 1970, or a rate alone. The rows before are passed over in blocks.
+#[test]
+fn a_part_of_a_long_record_comes_in_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("day.csv");
+    let ends = [310.0, 520.5];
+    for (clock, time) in [
+        ("t", ""),
+        ("stamp", "time = { column = \"stamp\", unit = \"ns\" }"),
+        ("number", "time = { rate = 500.0 }"),
+    ] {
+        let mut text = format!("{clock},q1,q2,tau1,tau2\n");
+        for k in 0..300_000 {
+            let t = 0.002 * k as f64;
+            let stamp = match clock {
+                "t" => format!("{t:.3}"),
+                "stamp" => format!("{}", 1_700_000_000_000_000_000_u64 + 2_000_000 * k),
+                _ => format!("{k}"),
+            };
+            let [q, v] = [(0.9 * t).sin(), (0.9 * t).cos()];
+            text += &format!("{stamp},{q:.9},{v:.9},{:.9},{k}\n", 2.0 * q + v);
+        }
+        assert!(text.len() > 12_000_000, "several blocks of the reader");
+        std::fs::write(&path, text).unwrap();
+        let columns = match time {
+            "" => String::new(),
+            time => format!(
+                "[record.columns]\n{time}\nq = [\"q1\", \"q2\"]\ntau = [\"tau1\", \"tau2\"]\n"
+            ),
+        };
+        let [from, to] = ends;
+        let toml = format!(
+            "robot = \"planar2\"\n[[record]]\nlog = \"day.csv\"\nuse = \"fit\"\nto = 300.0\n{columns}\
+             [[record]]\nlog = \"day.csv\"\nuse = \"holdout\"\nfrom = {from}\nto = {to}\n{columns}"
+        );
+        let file = folder.path().join("experiment.toml");
+        std::fs::write(&file, toml).unwrap();
+        let whole = Experiment::read(&file).unwrap();
+        let outline = Outline::read(&file).unwrap();
+        for (k, whole) in whole.records.iter().enumerate() {
+            let mut parts = Vec::new();
+            let mut take = |part| {
+                parts.push(part);
+                Ok(ControlFlow::Continue(()))
+            };
+            outline.parts(k, 40_000, &mut take).unwrap();
+            assert!(parts.len() >= 3, "{clock}: {}", parts.len());
+            parts::hold(&parts, whole, clock);
+            let times: Vec<f64> = parts.iter().flat_map(|p| p.t.clone()).collect();
+            assert!(
+                times
+                    .iter()
+                    .zip(&whole.t)
+                    .all(|(a, b)| (a - b).abs() < 1e-6)
+                    || clock == "number"
+            );
+        }
+        // beyond the end of the log there is nothing
+        let toml = format!(
+            "robot = \"planar2\"\n[[record]]\nlog = \"day.csv\"\nuse = \"fit\"\nfrom = 9000\n{columns}"
+        );
+        std::fs::write(&file, toml).unwrap();
+        let outline = Outline::read(&file).unwrap();
+        let none = outline.parts(0, 40_000, &mut |_| Ok(ControlFlow::Continue(())));
+        let message = none.unwrap_err().to_string();
+        assert!(message.contains("lie between 9000 s"), "{message}");
+    }
 }
 
 /// Parts of a log with names that say nothing, parts of a few rows, and a log in which nothing moves are refused; a part that stands is

@@ -80,6 +80,7 @@ fn prepared(name: &str, x: &Samples, torque: Vec<f64>, rate: f64) -> Prepared {
         periods: None,
         position_cutoff: vec![f64::INFINITY; x.dof],
         cutoff_reason: String::new(),
+        thin: None,
         warnings: Vec::new(),
     }
 }

@@ -1,5 +1,6 @@
 //! Filters, derivatives, cut-offs and period averages.
 
+use crate::common::noise::normal;
 use excite::signals::butterworth::{Butterworth, first_derivative, second_derivative};
 use excite::signals::{Decimator, cutoff, fourier};
 use rand::{Rng, SeedableRng};
@@ -210,7 +211,7 @@ fn the_cutoff_lies_where_motion_sinks_into_noise() {
             (2.0 * PI * 0.7 * t).sin() + 0.1 * (2.0 * PI * 6.0 * t).sin() + 1e-5 * noise
         })
         .collect();
-    let c = cutoff::aperiodic(&q, rate, 4);
+    let c = cutoff::aperiodic(&q, rate, 4, usize::MAX);
     assert!((12.0..40.0).contains(&c.frequency), "{}", c.frequency);
     let truth = 2.0 * 1e-10 / rate;
     assert!(
@@ -281,4 +282,53 @@ fn the_derivation_is_an_option() {
         set.position_cutoff = Some(10.0);
     });
     assert!(Prepared::new(&record, &plant, &both).is_err());
+}
+
+/// One sample in many is enough for what has no high frequencies: the outputs are those of the filter over all samples, at the
+/// same times, with gaps where they have some.
+#[test]
+fn the_parallel_filter_over_fewer_samples_is_the_same_filter() {
+    let (n, rate, fc) = (20_000, 1000.0, 4.5);
+    let mut valid = vec![true; n];
+    valid[9000..9003].fill(false);
+    for most in [1, 2, 7, 27, 1000] {
+        let (all, stride) = Decimator::with_stride(fc, rate, &valid, false, most);
+        assert!(stride <= most && all.factor.is_multiple_of(stride));
+        assert!((60..=74).contains(&all.factor), "{}", all.factor);
+        let Some(few) = all.over_every(stride) else {
+            assert_eq!(stride, 1);
+            continue;
+        };
+        let stamps: Vec<usize> = few.at().iter().map(|i| i * stride).collect();
+        assert_eq!(stamps, all.at(), "the same outputs");
+        // from the pass band to the edge of the stop band, and a constant
+        for f in [0.0, 0.7, 4.5, 6.0] {
+            let wave = |i: usize| (2.0 * PI * f * i as f64 / rate + 0.4).sin();
+            let x: Vec<f64> = (0..n).map(wave).collect();
+            let thin: Vec<f64> = x.iter().step_by(stride).copied().collect();
+            let pairs = all.apply(&x).into_iter().zip(few.apply(&thin));
+            let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // beyond the highest that so few samples can hold, images fold back
+            let enough = rate / stride as f64 > 6.0 * fc;
+            assert!(worst < 3e-4 || !enough, "{most} {f} Hz: {worst:.1e}");
+        }
+    }
+    // nothing is thinned of a signal that repeats
+    let cyclic = Decimator::new(fc, rate, &vec![true; 1000], true);
+    assert!(cyclic.over_every(2).is_none());
+}
+
+/// A few windows say of white noise what all of them do.
+#[test]
+fn a_few_windows_give_the_level_of_all() {
+    let mut rng = rand::rngs::StdRng::seed_from_u64(3);
+    let x: Vec<f64> = (0..60_000).map(|_| normal(&mut rng)).collect();
+    let mean = |(_, d): (Vec<f64>, Vec<f64>)| d.iter().sum::<f64>() / d.len() as f64;
+    let all = mean(fourier::welch(&x, 1.0, 1000));
+    let few = mean(fourier::welch_of(&x, 1.0, 1000, 16));
+    assert!((few / all - 1.0).abs() < 0.05, "{few} {all}");
+    assert_eq!(
+        fourier::welch(&x, 1.0, 1000),
+        fourier::welch_of(&x, 1.0, 1000, 1 << 20)
+    );
 }

@@ -214,7 +214,8 @@ pub(crate) fn read_parts(
             request.skip.clone(),
             &mut one,
         )?;
-        if !enough {
+        // nothing is left where the last rows were passed over
+        if !enough && !last.columns.iter().all(Vec::is_empty) {
             let _ = text(last, each)?;
         }
         return Ok(());
