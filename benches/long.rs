@@ -1,7 +1,8 @@
 //! Long logs, and a diagnosis of five: time, and the most memory that was held (Linux).
 //!
 //! ```sh
-//! cargo bench --bench long -- log 10        # millions of rows of seven joints: read, and condensed in parts
+//! cargo bench --bench long -- log 10        # millions of rows of seven joints: read, and identified in parts
+//! cargo bench --bench long -- digits 10     # the same with all digits of the numbers, in place of six decimals
 //! cargo bench --bench long -- diagnose 5    # records of 20 s at 1 kHz of a clean Panda
 //! ```
 //!
@@ -34,7 +35,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let number = words.iter().find_map(|a| a.parse::<usize>().ok());
     match words.iter().any(|a| a == "diagnose") {
         true => diagnosis(number.unwrap_or(5), whole),
-        false => log(number.unwrap_or(1) * if whole { 1_000_000 } else { 4000 }),
+        false => {
+            let rows = number.unwrap_or(1) * if whole { 1_000_000 } else { 4000 };
+            log(rows, words.iter().any(|a| a == "digits"))
+        }
     }
 }
 
@@ -87,23 +91,31 @@ fn said(what: &str, since: Instant, megabytes: f64) {
     println!("{what}: {seconds:.1} s{rate}{most}");
 }
 
-fn log(rows: usize) -> Result<(), Box<dyn std::error::Error>> {
+fn log(rows: usize, digits: bool) -> Result<(), Box<dyn std::error::Error>> {
     let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
     let plant = Plant::load("panda")?.with_terms(&terms);
     let path = std::env::temp_dir().join(format!("excite_long_{}.csv", std::process::id()));
-    let done = generate(&plant, &path, rows).and_then(|()| long(&plant, &path, rows));
+    let done = generate(&plant, &path, rows, digits).and_then(|()| long(&plant, &path, rows));
     std::fs::remove_file(&path)?;
     done
 }
 
 /// Ten periods, again and again.
-fn generate(plant: &Plant, path: &Path, rows: usize) -> Result<(), Box<dyn std::error::Error>> {
+fn generate(
+    plant: &Plant,
+    path: &Path,
+    rows: usize,
+    digits: bool,
+) -> Result<(), Box<dyn std::error::Error>> {
     let record = run(plant, if rows > 50_000 { 10 } else { 1 }, 1, Purpose::Fit)?;
     let lines: Vec<String> = (0..record.len())
         .map(|i| {
             let mut line = String::new();
             for column in record.q.iter().chain(&record.tau) {
-                let _ = write!(line, ",{:.6}", column[i]);
+                let _ = match digits {
+                    true => write!(line, ",{}", column[i]),
+                    false => write!(line, ",{:.6}", column[i]),
+                };
             }
             line
         })

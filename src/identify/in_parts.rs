@@ -192,7 +192,7 @@ fn each_part<T: Send>(
 ) -> Result<()> {
     let workers = rayon::current_num_threads().clamp(1, AT_ONCE);
     std::thread::scope(|scope| {
-        let (send, parts) = mpsc::sync_channel(0);
+        let (send, parts) = mpsc::sync_channel(1);
         let reader = scope.spawn(move || {
             let mut index = 0;
             outline.parts(record, rows, &mut |part| {

@@ -124,6 +124,22 @@ pub fn weighted_row(
     weights: &Weights,
     a: usize,
 ) -> Mat<f64> {
+    if let Weights::Same(l) = weights {
+        let (b, m) = (stack.w.ncols(), stack.count);
+        let mut out = Mat::<f64>::zeros(m, b + 1);
+        for d in (0..stack.actuators).filter(|d| l[(a, *d)] != 0.0) {
+            let x = l[(a, d)];
+            for c in 0..=b {
+                let from = match c < b {
+                    true => &stack.w.col_as_slice(c)[d * m..][..m],
+                    false => &tau[d * m..][..m],
+                };
+                let to = out.col_as_slice_mut(c);
+                to.iter_mut().zip(from).for_each(|(to, w)| *to += x * w);
+            }
+        }
+        return out;
+    }
     Mat::from_fn(stack.count, stack.w.ncols() + 1, |s, c| {
         weighted_at(stack, tau, weights.at(record, s), [a, s, c])
     })
