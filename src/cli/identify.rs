@@ -73,7 +73,7 @@ pub struct Args {
     /// coulomb and offset where that of a serial one lists none for any joint]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
-    /// Read the logs in parts of so many rows, and hold no more than two parts at a time; 0 reads them whole [default:
+    /// Read the logs in parts of so many rows, and hold a few of them at a time; 0 reads them whole [default:
     /// 250000 where a CSV has more than 100 MB or a bag more than 50 MB, else 0]
     #[arg(long, value_name = "N")]
     rows: Option<usize>,

@@ -18,7 +18,7 @@ use super::settings::{Method, Settings};
 use super::validation::{Errors, validate};
 use super::{doubts, uncertainty};
 use crate::base::BaseParameters;
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind, counted};
 use crate::log::{Outline, Payload, Purpose, Record};
 use crate::plant::Plant;
 use crate::signals;
@@ -323,8 +323,10 @@ fn found(
     let mut warnings = merged.warnings;
     warnings.extend(shares.iter().map(|s| {
         let message = format!(
-            "{} rows were read in {} parts: parameters and errors are of all of them, figures over time of the first {}",
-            s.rows, s.parts, s.shown
+            "{} rows were read in {}: parameters and errors are of all of them, figures over time of the first {}",
+            s.rows,
+            counted(s.parts, "part"),
+            s.shown
         );
         Warning::new(WarningKind::ReadInParts, &s.record, message)
     }));
