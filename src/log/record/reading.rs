@@ -255,12 +255,15 @@ impl Window {
         }
     }
 
-    /// That nothing of the log counts.
+    /// That nothing of the log counts. How long it is nobody knows: rows before the part that counts are not all read.
     fn empty(&self, path: &Path) -> Error {
         let [from, to] = self.ends;
-        let length = self.read.map_or(0.0, |r| r[0]);
+        let end = match to.is_finite() {
+            true => format!("{to} s"),
+            false => "its end".into(),
+        };
         let message = format!(
-            "fewer than {LEAST} samples lie between {from} s and {to} s of the record, which is {length:.3} s long"
+            "fewer than {LEAST} samples lie between {from} s of the record and {end}; `excite log` says how long it is"
         );
         Error::file(path, "", message)
     }
