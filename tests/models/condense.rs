@@ -385,7 +385,10 @@ fn a_part_of_a_long_record_comes_in_parts() {
         let outline = Outline::read(&file).unwrap();
         let none = outline.parts(0, 40_000, &mut |_| Ok(ControlFlow::Continue(())));
         let message = none.unwrap_err().to_string();
-        assert!(message.contains("lie between 9000 s of the record and its end"), "{message}");
+        assert!(
+            message.contains("lie between 9000 s of the record and its end"),
+            "{message}"
+        );
     }
 }
 
