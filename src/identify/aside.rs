@@ -14,6 +14,7 @@ use super::trace::Trace;
 use crate::dot::dot;
 use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
+use crate::regressor::sign;
 use crate::signals::Prepared;
 
 /// Share of a joint's residual that must go with another joint.
@@ -69,11 +70,10 @@ pub fn apart(
             let each = |g: fn(f64, f64) -> f64| -> Vec<f64> {
                 va.iter().zip(vb).map(|(x, y)| g(*x, *y)).collect()
             };
-            let sign: fn(f64, f64) -> f64 = |_, y| if y == 0.0 { 0.0 } else { y.signum() };
             let signals = [
                 vb.to_vec(),
                 motion.qdd[b * n..(b + 1) * n].to_vec(),
-                each(sign),
+                each(|_, y| sign(y)),
                 each(|x, y| (x + y).signum()),
                 each(|x, y| (x - y).signum()),
             ];

@@ -16,7 +16,7 @@
 
 use super::breakaway;
 use super::cross_validation::FOLDS;
-use super::equations::{self, Equations, Fit};
+use super::equations::{self, Equations};
 use super::factor::{self, Factor, Header, Part, columns_of};
 use super::linear::{self, Weights};
 use super::merge;
@@ -92,20 +92,17 @@ pub(super) fn of_records(
         let mut fit = all.fit()?;
         warnings.extend(fit.unit_suspicions());
         fit.keep_moving(&mut warnings)?;
-        let known = base.count();
-        let condensed = |fit: &Fit| -> Result<(Part, Vec<Mat<f64>>, Stack, merge::Estimate)> {
-            let (a, folds) = part(&fit.stacks(), FOLDS);
-            let columns = columns_of(&a, &linear::factor(&folds));
-            let rows = factor::equations(&a, Purpose::Fit, known, &columns);
-            let found = merge::estimate(&rows, &a, Method::Wls)?;
-            Ok((a, folds, rows, found))
-        };
-        let mut found = condensed(&fit)?;
-        if fit.set_aside(&found.3.pi, &mut warnings)? {
-            found = condensed(&fit)?;
+        let mut solved = Solved::new(&fit.stacks(), base.count())?;
+        if fit.set_aside(&solved.estimate.pi, &mut warnings)? {
+            solved = Solved::new(&fit.stacks(), base.count())?;
         }
-        let (rows, estimate);
-        (a, folds, rows, estimate) = found;
+        let Solved {
+            part,
+            folds: of_folds,
+            rows,
+            estimate,
+        } = solved;
+        (a, folds) = (part, of_folds);
         let stacks = fit.stacks();
         for s in stacks.iter().filter(|_| correlated) {
             let inflation = match stacks.len() {
@@ -151,6 +148,30 @@ pub(super) fn of_records(
 
 fn triangle(columns: &Mat<f64>) -> Mat<f64> {
     linear::factor(std::slice::from_ref(columns))
+}
+
+/// Records for the fit: condensed, and the estimate that this gives.
+struct Solved {
+    part: Part,
+    folds: Vec<Mat<f64>>,
+    /// rows that are as good as those of the records
+    rows: Stack,
+    estimate: merge::Estimate,
+}
+
+impl Solved {
+    /// With so many base parameters.
+    fn new(stacks: &[&Stack], count: usize) -> Result<Solved> {
+        let (part, folds) = part(stacks, FOLDS);
+        let columns = columns_of(&part, &linear::factor(&folds));
+        let rows = factor::equations(&part, Purpose::Fit, count, &columns);
+        Ok(Solved {
+            estimate: merge::estimate(&rows, &part, Method::Wls)?,
+            part,
+            folds,
+            rows,
+        })
+    }
 }
 
 /// What is said of records, and the factor of each fold.

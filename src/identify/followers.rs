@@ -2,6 +2,7 @@
 
 use super::trace::Trace;
 use crate::log::Purpose;
+use crate::regressor::sign;
 
 /// A residual that is proportional, in part, to a function of another joint's velocity.
 #[derive(Debug, Clone, serde::Serialize)]
@@ -22,7 +23,6 @@ type Function = fn(f64, f64) -> f64;
 /// Looks, joint by joint, for the function of another joint's velocity that explains most of the
 /// residual, beyond what functions of its own velocity do. The shares below a tenth are left out.
 pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
-    let sign = |x: f64| if x == 0.0 { 0.0 } else { x.signum() };
     let fitted: Vec<&Trace> = (traces.iter())
         .filter(|t| t.purpose == Purpose::Fit)
         .collect();
@@ -51,9 +51,7 @@ pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
         for b in (0..names.len()).filter(|b| *b != a) {
             let functions: [(String, Function); 4] = [
                 (format!("the velocity of {}", names[b]), |_, y| y),
-                (format!("the direction of {}", names[b]), |_, y| {
-                    if y == 0.0 { 0.0 } else { y.signum() }
-                }),
+                (format!("the direction of {}", names[b]), |_, y| sign(y)),
                 (
                     format!("the direction of {} + {}", names[a], names[b]),
                     |x, y| (x + y).signum(),

@@ -97,7 +97,6 @@ pub fn condense_parts(
         };
         // equations of the parts whose correlation in time was looked at
         let mut looked = 0.0;
-        let mut index = 0;
         each_part(outline, k, rows, &work, &mut |done| {
             let (factor, rows, first) = match done {
                 Done::LeftOut(mut warnings) => {
@@ -106,10 +105,9 @@ pub fn condense_parts(
                 }
                 Done::Part { factor, rows, head } => (*factor, rows, head),
             };
-            if correlated(index) {
+            if correlated(share.as_ref().map_or(0, |s| s.parts)) {
                 looked += factor.header.parts[0].used.iter().sum::<f64>();
             }
-            index += 1;
             sum = Some(match sum.take() {
                 Some(all) => all.and_then(factor)?,
                 None => factor,

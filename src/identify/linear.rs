@@ -6,7 +6,7 @@
 
 use super::stack::Stack;
 use crate::error::{Error, Result};
-use faer::{Mat, MatRef, Side};
+use faer::{ColRef, Mat, MatMut, MatRef, Side};
 use rayon::prelude::*;
 
 /// How the rows of a sample are weighted.
@@ -88,20 +88,9 @@ pub fn weighted(
     let (n, b, m) = (stack.actuators, stack.w.ncols(), range.len());
     let mut out = Mat::<f64>::zeros(n * m, b + 1);
     if let Weights::Same(l) = weights {
-        for (a, d) in (0..n).flat_map(|a| (0..n).map(move |d| (a, d))) {
-            let x = l[(a, d)];
-            if x == 0.0 {
-                continue;
-            }
-            let from = d * stack.count + range.start;
-            for c in 0..b {
-                let mut to = out.as_mut().subrows_mut(a * m, m).col_mut(c);
-                let from = stack.w.as_ref().subrows(from, m).col(c);
-                faer::zip!(&mut to, &from).for_each(|faer::unzip!(to, w)| *to += x * *w);
-            }
-            for k in 0..m {
-                out[(a * m + k, b)] += x * tau[from + k];
-            }
+        for a in 0..n {
+            let to = out.as_mut().subrows_mut(a * m, m);
+            add_weighted(stack, tau, l.as_ref(), a, range.start, to);
         }
         return out;
     }
@@ -116,6 +105,30 @@ pub fn weighted(
     out
 }
 
+/// Adds the weighted rows `[W τ]` of actuator `a`, from a sample on, with one matrix for all samples.
+fn add_weighted(
+    stack: &Stack,
+    tau: &[f64],
+    l: MatRef<'_, f64>,
+    a: usize,
+    start: usize,
+    mut to: MatMut<'_, f64>,
+) {
+    let (b, m) = (stack.w.ncols(), to.nrows());
+    for d in (0..stack.actuators).filter(|d| l[(a, *d)] != 0.0) {
+        let x = l[(a, d)];
+        let from = d * stack.count + start;
+        for c in 0..=b {
+            let from = match c < b {
+                true => stack.w.as_ref().subrows(from, m).col(c),
+                false => ColRef::from_slice(&tau[from..from + m]),
+            };
+            let mut to = to.as_mut().col_mut(c);
+            faer::zip!(&mut to, &from).for_each(|faer::unzip!(to, w)| *to += x * *w);
+        }
+    }
+}
+
 /// Weighted rows `[W τ]` of all samples of a record, of one actuator alone.
 pub fn weighted_row(
     stack: &Stack,
@@ -125,19 +138,8 @@ pub fn weighted_row(
     a: usize,
 ) -> Mat<f64> {
     if let Weights::Same(l) = weights {
-        let (b, m) = (stack.w.ncols(), stack.count);
-        let mut out = Mat::<f64>::zeros(m, b + 1);
-        for d in (0..stack.actuators).filter(|d| l[(a, *d)] != 0.0) {
-            let x = l[(a, d)];
-            for c in 0..=b {
-                let from = match c < b {
-                    true => &stack.w.col_as_slice(c)[d * m..][..m],
-                    false => &tau[d * m..][..m],
-                };
-                let to = out.col_as_slice_mut(c);
-                to.iter_mut().zip(from).for_each(|(to, w)| *to += x * w);
-            }
-        }
+        let mut out = Mat::<f64>::zeros(stack.count, stack.w.ncols() + 1);
+        add_weighted(stack, tau, l.as_ref(), a, 0, out.as_mut());
         return out;
     }
     Mat::from_fn(stack.count, stack.w.ncols() + 1, |s, c| {

@@ -106,24 +106,21 @@ impl Stack {
                         let inputs = p.filter.inputs(range.clone());
                         for (c, to) in out.w.chunks_exact_mut(n * outputs).enumerate() {
                             let jump = jumps.iter().find(|j| j.0 == base.kept[c]);
-                            if let Some((_, joint)) = jump {
-                                let speeds = &motion.qd[joint * motion.count..][..motion.count];
-                                let signs = inputs.iter().map(|&i| sign(speeds[i]));
-                                let signs: Vec<f64> = signs.collect();
-                                let to = &mut to[joint * outputs..(joint + 1) * outputs];
-                                p.filter.apply_part(&signs, range.clone(), to);
-                            }
+                            let Some((_, joint)) = jump else { continue };
+                            let speeds = &motion.qd[joint * motion.count..][..motion.count];
+                            let signs: Vec<f64> = inputs.iter().map(|&i| sign(speeds[i])).collect();
+                            let to = &mut to[joint * outputs..(joint + 1) * outputs];
+                            p.filter.apply_part(&signs, range.clone(), to);
                         }
                         match plant.knows_terms() {
                             true => plant.known_torque(&motion.select(&inputs))?,
-                            false => Vec::new(),
+                            false => return Ok(out),
                         }
                     }
                 };
                 let whole = known.len() / n;
-                for (from, to) in (known.chunks_exact(whole.max(1)))
-                    .zip(out.known.chunks_exact_mut(outputs.max(1)))
-                {
+                for (a, to) in out.known.chunks_exact_mut(outputs).enumerate() {
+                    let from = &known[a * whole..(a + 1) * whole];
                     p.filter.apply_part(from, range.clone(), to);
                 }
                 Ok(out)

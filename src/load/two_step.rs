@@ -36,6 +36,7 @@ use crate::log::Payload;
 use crate::mechanism::task::rates_to_omega;
 use crate::mechanism::{Mechanism, Task};
 use crate::plant::Plant;
+use crate::regressor::sign;
 use crate::robot::Inertia;
 use crate::robot::inertia::Quantities;
 use crate::robot::inertia::skew;
@@ -331,7 +332,7 @@ pub fn wrenches(
         let own = mechanism.actuated.contains(&j);
         for i in 0..n {
             let [_, qd, qdd] = motion.tree.at(j, i);
-            let sign = if qd == 0.0 { 0.0 } else { qd.signum() };
+            let sign = sign(qd);
             let [armature, viscous, coulomb, offset] = joint.terms;
             gamma[j * n + i] += armature * qdd;
             if !own {

@@ -68,18 +68,22 @@ fn counter(jump: f64) -> Option<&'static str> {
         .map(|(_, name)| name)
 }
 
+/// The step of an even grid, from the first stamp to the last, if all stamps lie on it.
+fn grid(t: &[f64]) -> Option<f64> {
+    let [first, .., last] = t[..] else {
+        return None;
+    };
+    let step = (last - first) / (t.len() - 1) as f64;
+    let near = |(i, x): (usize, &f64)| (x - first - step * i as f64).abs() <= EVEN * step;
+    t.iter().enumerate().all(near).then_some(step)
+}
+
 /// The clock of stamps with which nothing is wrong, as most are: each where an even grid has it, and steps that can be
 /// seconds. `None` where they need a closer look.
 fn sound(raw: &[f64]) -> Option<Clock> {
-    let [first, .., last] = raw[..] else {
-        return None;
-    };
-    let step = (last - first) / (raw.len() - 1) as f64;
-    let apart = |(i, x): (usize, &f64)| (x - first - step * i as f64).abs();
-    let near = |x: f64| x <= EVEN * step;
-    let seconds = step > 0.0 && step < 0.9 * LONG && is_time(first) && is_time(last);
-    let even = seconds && raw.iter().enumerate().map(apart).all(near);
-    even.then(|| Clock {
+    let step = grid(raw).filter(|step| *step > 0.0 && *step < 0.9 * LONG)?;
+    // what lies between them is a time as well
+    (is_time(raw[0]) && is_time(raw[raw.len() - 1])).then(|| Clock {
         keep: None,
         t: raw.to_vec(),
         step,
@@ -181,17 +185,11 @@ fn missing(gaps: &[[f64; 2]], step: f64, subject: &str) -> Option<Warning> {
 /// Step of the grid, whether the stamps lie on it, and how far they jitter, as a share of it, where that is worth a
 /// word. Even is meant against the line from first to last stamp; a grid with gaps is not.
 fn evenness(t: &[f64], step: f64) -> (f64, bool, Option<f64>) {
-    let [first, .., last] = t[..] else {
+    if t.len() < 2 {
         return (0.0, false, None);
-    };
-    let mean = (last - first) / (t.len() - 1) as f64;
-    let worst = t
-        .iter()
-        .enumerate()
-        .map(|(i, x)| (x - first - mean * i as f64).abs())
-        .fold(0.0, f64::max);
-    if worst <= EVEN * mean {
-        return (mean, true, None);
+    }
+    if let Some(step) = grid(t) {
+        return (step, true, None);
     }
     let spread: Vec<f64> = t
         .windows(2)

@@ -6,6 +6,7 @@ mod entry;
 use super::Table;
 use super::formats::Format;
 use super::names::{self, Quantity};
+use super::place::Place;
 use super::resample::{Order, interpolate};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Joint;
@@ -14,33 +15,25 @@ use std::path::Path;
 /// Steps of a sampling, s, that are believed.
 const STEPS: [f64; 2] = [2e-5, 0.5];
 
-/// A column by its name, or by its number from 1.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Place {
-    Name(String),
-    Number(usize),
-}
-
 impl Place {
     fn find(&self, table: &Table, path: &Path) -> Result<usize> {
-        match self {
-            Place::Name(name) => table.find(name).ok_or_else(|| {
-                let names: Vec<&str> = table.names.iter().take(40).map(String::as_str).collect();
-                let message = format!(
-                    "there is no column `{name}`; its columns are {}{}",
-                    names.join(", "),
-                    if table.names.len() > 40 { ", …" } else { "" }
-                );
-                Error::file(path, "", message)
-            }),
-            Place::Number(k) => (1..=table.names.len())
-                .contains(k)
-                .then(|| k - 1)
-                .ok_or_else(|| {
-                    let message = format!("there is no column {k}; it has {}", table.names.len());
-                    Error::file(path, "", message)
-                }),
-        }
+        let all = table.names.iter().map(String::as_str);
+        self.position(all.clone()).ok_or_else(|| {
+            let message = match self {
+                Place::Name(name) => {
+                    let names: Vec<&str> = all.take(40).collect();
+                    format!(
+                        "there is no column `{name}`; its columns are {}{}",
+                        names.join(", "),
+                        if table.names.len() > 40 { ", …" } else { "" }
+                    )
+                }
+                Place::Number(k) => {
+                    format!("there is no column {k}; it has {}", table.names.len())
+                }
+            };
+            Error::file(path, "", message)
+        })
     }
 }
 

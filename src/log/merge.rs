@@ -15,14 +15,14 @@ impl Layout {
             (named.quantity == super::names::Quantity::Time).then_some((k, named))
         })?;
         let factor = named.unit.and_then(super::names::unit).map(|(_, f)| f);
-        Some(Time::Column(super::layout::Place::Number(k + 1), factor))
+        Some(Time::Column(super::place::Place::Number(k + 1), factor))
     }
 }
 
 /// Number of the column of the time and its factor.
 fn time(table: &Table, format: Format) -> Option<(usize, f64)> {
     match Layout::time_of(table, format)? {
-        Time::Column(super::layout::Place::Number(k), factor) => {
+        Time::Column(super::place::Place::Number(k), factor) => {
             let k = k - 1;
             Some((k, factor.unwrap_or_else(|| time_unit(&table.columns[k]).0)))
         }

@@ -25,6 +25,7 @@ pub(crate) mod names;
 pub(crate) mod number;
 mod outline;
 pub mod parts;
+pub(crate) mod place;
 mod pose_check;
 pub(crate) mod pressure;
 pub(crate) mod record;

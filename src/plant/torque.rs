@@ -4,7 +4,7 @@ use super::Plant;
 use crate::dynamics::{Samples, Workspace};
 use crate::error::Result;
 use crate::regressor::{Regressor, nominal_torque, term_factor};
-use crate::robot::{Column, JointTerm};
+use crate::robot::{Column, Joint, JointTerm};
 use faer::Mat;
 use std::borrow::Cow;
 
@@ -120,10 +120,8 @@ impl Plant {
 
     /// Whether [`Plant::known_torque`] of a tree is anything but zero.
     pub(crate) fn knows_terms(&self) -> bool {
-        self.robot.joints.iter().any(|joint| {
-            let terms = joint.terms.iter().zip(joint.identify);
-            joint.stribeck.force != 0.0 || terms.into_iter().any(|(x, asked)| *x != 0.0 && !asked)
-        })
+        let known = |j: &Joint| j.stribeck.force != 0.0 || known_of(j).next().is_some();
+        self.robot.joints.iter().any(known)
     }
 
     /// Torque of the terms of a tree's joints that are not identified: no difference of nearly
@@ -136,11 +134,7 @@ impl Plant {
                     tau[j * x.count + s] += joint.stribeck.torque(x.qd[j * x.count + s]);
                 }
             }
-            for term in JointTerm::ALL {
-                let value = joint.terms[term as usize];
-                if joint.identify[term as usize] || value == 0.0 {
-                    continue;
-                }
+            for (term, value) in known_of(joint) {
                 for s in 0..x.count {
                     tau[j * x.count + s] += value * term_factor(term, x.at(j, s));
                 }
@@ -217,4 +211,11 @@ impl Plant {
             .projected_regressor(ws, &[body], tree, g, na, &mut w, rows, count);
         Ok(Mat::from_fn(rows, 10, |r, k| w[k * rows + r]))
     }
+}
+
+/// Terms of a joint that are not identified, with their values other than zero.
+fn known_of(joint: &Joint) -> impl Iterator<Item = (JointTerm, f64)> + '_ {
+    let all = JointTerm::ALL.into_iter().map(|t| (t, t as usize));
+    all.filter(|&(_, k)| !joint.identify[k] && joint.terms[k] != 0.0)
+        .map(|(term, k)| (term, joint.terms[k]))
 }

@@ -164,34 +164,18 @@ impl Decimator {
             x.len() == self.count && out.len() == self.at.len(),
             "lengths of signal and filter"
         );
-        let m = self.reach();
-        let inner = Inner::new();
-        let whole = |i: usize| i >= m && i + m < x.len();
-        for (y, at) in out.chunks_mut(AT_ONCE).zip(self.at.chunks(AT_ONCE)) {
-            if let [a, b, c, d] = *at
-                && whole(a)
-                && whole(d)
-            {
-                let part = |i: usize| &x[i - m..=i + m];
-                let parts = [part(a), part(b), part(c), part(d)];
-                y.copy_from_slice(&inner.four(&self.kernel, parts));
-                continue;
-            }
-            for (y, &i) in y.iter_mut().zip(at) {
-                *y = match whole(i) {
-                    true => inner.one(&self.kernel, &x[i - m..=i + m]),
-                    // only where the signal repeats
-                    false => {
-                        let n = x.len();
-                        let wrapped = |k: usize| x[(i + n * (m / n + 1) + k - m) % n];
-                        self.kernel
-                            .iter()
-                            .enumerate()
-                            .map(|(k, w)| w * wrapped(k))
-                            .sum()
-                    }
-                };
-            }
+        let (m, n) = (self.reach(), x.len());
+        let from = self.at.partition_point(|i| *i < m);
+        let to = self.at.partition_point(|i| i + m < n).max(from);
+        if from < to {
+            self.apply_part(&x[self.at[from] - m..], from..to, &mut out[from..to]);
+        }
+        // the ends are there only where the signal repeats
+        for k in (0..from).chain(to..out.len()) {
+            let i = self.at[k];
+            let wrapped = |k: usize| x[(i + n * (m / n + 1) + k - m) % n];
+            let products = self.kernel.iter().enumerate();
+            out[k] = products.map(|(k, w)| w * wrapped(k)).sum();
         }
     }
 

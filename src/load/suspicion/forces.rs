@@ -10,6 +10,7 @@ use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::load::system::System;
 use crate::plant::Plant;
+use crate::regressor::sign;
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 
@@ -130,7 +131,7 @@ impl<'a> Probe<'a> {
                 a[(r, c)] = model.columns[(r, k)];
             }
             let v = model.moved.qd[j * n + i];
-            a[(r, nk + 3 * j)] = if v == 0.0 { 0.0 } else { v.signum() };
+            a[(r, nk + 3 * j)] = sign(v);
             a[(r, nk + 3 * j + 1)] = v;
             a[(r, nk + 3 * j + 2)] = 1.0;
             y[(r, 0)] = torque[r] - model.rigid[r];

@@ -7,7 +7,6 @@
 use super::dialect::{Cell, Dialect, canonical, idle, stamp, strip};
 use super::{Each, Skip};
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::log::layout::Place;
 use crate::log::{Table, number};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -68,7 +67,7 @@ pub(crate) fn read_parts<T>(
     wanted: &dyn Fn(&str) -> bool,
     check: &dyn Fn(&Table) -> Result<T>,
     rows: usize,
-    skip: Option<Skip>,
+    skip: Option<&Skip>,
     each: Each,
 ) -> Result<(Table, T)> {
     let mut skip = skip.map(Skipping::new);
@@ -129,23 +128,10 @@ pub(crate) fn read_parts<T>(
             checked = Some(check(&table)?);
             layout = Some((dialect, keep));
         }
-        let early = skip
-            .as_mut()
-            .zip(layout.as_ref())
-            .is_some_and(|(s, (dialect, _))| s.early(text, dialect));
-        if early && given + table.rows() > 0 {
-            // what was read before is a part of its own
-            let held = table.rows();
-            if held > 0 {
-                given += held;
-                let mut part = first_rows(&mut table, held);
-                if let Some((dialect, _)) = &layout {
-                    without_texts(&mut part, dialect);
-                }
-                if each(part)?.is_break() {
-                    break 'file;
-                }
-            }
+        let early = (skip.as_mut().zip(layout.as_ref()))
+            .is_some_and(|(s, (dialect, _))| s.early(text, dialect))
+            && given + table.rows() > 0;
+        if early {
             line += text.iter().filter(|b| **b == b'\n').count();
         } else if let Some((dialect, keep)) = &layout {
             let cut_off = end && !text.is_empty() && text.last() != Some(&b'\n');
@@ -166,14 +152,23 @@ pub(crate) fn read_parts<T>(
             append(
                 &mut table, &text, dialect, keep, &mut line, cut_off, &mut left, path,
             );
-            while table.rows() >= most {
-                let mut part = first_rows(&mut table, rows);
-                without_texts(&mut part, dialect);
-                given += rows;
-                if each(part)?.is_break() {
-                    table.columns.iter_mut().for_each(Vec::clear);
-                    break 'file;
-                }
+        }
+        loop {
+            // what was read before rows that are passed over is a part of its own
+            let count = match early {
+                true => table.rows(),
+                false if table.rows() >= most => rows,
+                false => 0,
+            };
+            let Some((dialect, _)) = layout.as_ref().filter(|_| count > 0) else {
+                break;
+            };
+            let mut part = first_rows(&mut table, count);
+            without_texts(&mut part, dialect);
+            given += count;
+            if each(part)?.is_break() {
+                table.columns.iter_mut().for_each(Vec::clear);
+                break 'file;
             }
         }
         block.copy_within(whole..filled, 0);
@@ -229,16 +224,16 @@ pub(crate) fn read_parts<T>(
 }
 
 /// Blocks of rows that come before those that count.
-struct Skipping {
-    what: Skip,
+struct Skipping<'a> {
+    what: &'a Skip,
     /// first and last stamp that was seen; `None` before there is any
     seen: Option<[f64; 2]>,
     /// whether the stamps increased so far
     sound: bool,
 }
 
-impl Skipping {
-    fn new(what: Skip) -> Self {
+impl<'a> Skipping<'a> {
+    fn new(what: &'a Skip) -> Self {
         Skipping {
             what,
             seen: None,
@@ -249,14 +244,12 @@ impl Skipping {
     /// Whether all rows of a block come too early, by its first and last line. Stamps that do not increase from block to
     /// block say nothing, and nothing that follows is skipped.
     fn early(&mut self, text: &[u8], dialect: &Dialect) -> bool {
-        let column = match &self.what.time {
-            Place::Name(name) => dialect.names.iter().position(|n| n == name),
-            // columns of texts are not counted
-            Place::Number(k) => {
-                let numbers = (0..dialect.cells.len()).filter(|&k| dialect.cells[k] != Cell::Text);
-                k.checked_sub(1).and_then(|k| numbers.clone().nth(k))
-            }
-        };
+        // columns of texts are not counted
+        let kept: Vec<usize> = (0..dialect.cells.len())
+            .filter(|&k| dialect.cells[k] != Cell::Text)
+            .collect();
+        let names = kept.iter().map(|&k| dialect.names[k].as_str());
+        let column = self.what.time.position(names).map(|at| kept[at]);
         let column = column.filter(|k| dialect.plain && dialect.cells[*k] == Cell::Number);
         let Some(column) = column.filter(|_| self.sound) else {
             return false;

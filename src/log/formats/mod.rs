@@ -21,7 +21,7 @@ mod sqlite;
 
 use super::Table;
 use crate::error::{Error, Result};
-use crate::log::layout::Place;
+use crate::log::place::Place;
 use std::io::Read as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -211,7 +211,7 @@ pub(crate) fn read_parts(
             request.wanted,
             &|_| Ok(()),
             rows,
-            request.skip.clone(),
+            request.skip.as_ref(),
             &mut one,
         )?;
         // nothing is left where the last rows were passed over

@@ -1,7 +1,8 @@
 //! `[record.columns]` as it is written.
 
-use super::{Group, Layout, Place, Source, Time};
+use super::{Group, Layout, Source, Time};
 use crate::log::names;
+use crate::log::place::Place;
 use toml::{Table, Value};
 
 const GROUPS: [&str; 6] = ["q", "tau", "dq", "ddq", "qref", "ql"];

@@ -21,11 +21,11 @@ const LARGEST: f64 = 1e12;
 const SLACK: f64 = 1e-6;
 
 impl Clock {
-    /// The number of rows whose time lies between, s from the first.
-    pub(super) fn rows_between(&self, from: f64, to: f64) -> usize {
+    /// Which rows' times lie between, s from the first.
+    pub(super) fn rows_between(&self, from: f64, to: f64) -> impl Iterator<Item = usize> + '_ {
         let first = self.t.first().copied().unwrap_or_default();
-        let inside = |t: &&f64| (from - SLACK..=to + SLACK).contains(&(*t - first));
-        self.t.iter().filter(inside).count()
+        let ends = from - SLACK..=to + SLACK;
+        (0..self.t.len()).filter(move |&i| ends.contains(&(self.t[i] - first)))
     }
 
     /// The rows whose time lies between, s from the first.
@@ -34,9 +34,7 @@ impl Clock {
             return Ok(self);
         };
         let (from, to) = (from.unwrap_or(0.0), to.unwrap_or(f64::INFINITY));
-        let inside: Vec<usize> = (0..self.t.len())
-            .filter(|&i| (from - SLACK..=to + SLACK).contains(&(self.t[i] - first)))
-            .collect();
+        let inside: Vec<usize> = self.rows_between(from, to).collect();
         if inside.len() < 8 {
             let last = self.t[self.t.len() - 1] - first;
             let message = format!(
@@ -80,16 +78,11 @@ impl Record {
 /// Whether it shows without any sorting that no sample is far: where more than a hundredth of them lie in the lowest
 /// quarter of the range, and as many in the highest, the middle 98 % are at least half the range wide.
 fn none_is_far(y: &[f64]) -> bool {
-    // an infinite value is as far as can be
-    let beyond = y.iter().filter(|x| x.abs() > LARGEST).count();
-    if beyond > 0 {
+    if y.iter().any(|x| x.abs() > LARGEST) {
         return false;
     }
-    let finite = y.len() - y.iter().filter(|x| x.is_nan()).count();
+    let finite = y.iter().filter(|x| !x.is_nan()).count();
     let [low, high] = extremes(y);
-    if finite == 0 {
-        return false;
-    }
     let quarter = 0.25 * (high - low);
     let (from, to) = (low + quarter, high - quarter);
     let ends = y.iter().fold([0, 0], |[a, b], &x| {

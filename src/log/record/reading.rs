@@ -4,7 +4,8 @@ use super::{POSE, check_names, numbered};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::log::clock::Clock;
 use crate::log::formats::{self, Format, Request, Skip, csv};
-use crate::log::layout::{Layout, Place, Time};
+use crate::log::layout::{Layout, Time};
+use crate::log::place::Place;
 use crate::log::{Purpose, Record, Table, merge};
 use crate::plant::Plant;
 use std::ops::ControlFlow;
@@ -171,8 +172,14 @@ impl Record {
         };
         if own(paths, reading)? {
             let check = |table: &Table| check_names(table, &joints, path);
-            let (mut last, unknown) =
-                csv::read_parts(path, &known, &check, rows, reading.skip(), &mut take)?;
+            let (mut last, unknown) = csv::read_parts(
+                path,
+                &known,
+                &check,
+                rows,
+                reading.skip().as_ref(),
+                &mut take,
+            )?;
             if !last.columns.iter().all(Vec::is_empty) {
                 last.warnings.extend(unknown);
                 let _ = take(last)?;
@@ -248,7 +255,7 @@ impl Window {
         if to < 0.0 {
             return Ok(Cut::Behind);
         }
-        match clock.rows_between(from, to) {
+        match clock.rows_between(from, to).count() {
             n if n < LEAST => Ok(Cut::Before),
             n if n == clock.t.len() => Ok(Cut::Inside(clock)),
             _ => clock.between([Some(from), Some(to)], path).map(Cut::Inside),
