@@ -17,7 +17,9 @@ use crate::median::median;
 /// Stamps after repair.
 #[derive(Debug, Clone, Default)]
 pub struct Clock {
-    /// rows that are kept; `None` for all
+    /// rows of the file that come before the first
+    pub before: usize,
+    /// rows that are kept, from that one on; `None` for all
     pub keep: Option<Vec<usize>>,
     /// increasing time of the kept rows, s
     pub t: Vec<f64>,
@@ -80,10 +82,11 @@ fn grid(t: &[f64]) -> Option<f64> {
 
 /// The clock of stamps with which nothing is wrong, as most are: each where an even grid has it, and steps that can be
 /// seconds. `None` where they need a closer look.
-fn sound(raw: &[f64]) -> Option<Clock> {
+fn sound(raw: &[f64], before: usize) -> Option<Clock> {
     let step = grid(raw).filter(|step| *step > 0.0 && *step < 0.9 * LONG)?;
     // what lies between them is a time as well
     (is_time(raw[0]) && is_time(raw[raw.len() - 1])).then(|| Clock {
+        before,
         keep: None,
         t: raw.to_vec(),
         step,
@@ -93,12 +96,12 @@ fn sound(raw: &[f64]) -> Option<Clock> {
     })
 }
 
-/// Looks through the stamps `raw` of the log called `subject`.
-pub fn repair(raw: &[f64], subject: &str) -> Clock {
-    sound(raw).unwrap_or_else(|| looked_through(raw, subject))
+/// Looks through the stamps `raw` of the log called `subject`, of which so many rows come `before`.
+pub fn repair(raw: &[f64], before: usize, subject: &str) -> Clock {
+    sound(raw, before).unwrap_or_else(|| looked_through(raw, before, subject))
 }
 
-fn looked_through(raw: &[f64], subject: &str) -> Clock {
+fn looked_through(raw: &[f64], before: usize, subject: &str) -> Clock {
     let steps = || raw.windows(2).map(|w| w[1] - w[0]);
     let usual = median(steps().filter(|d| *d > 0.0));
     if !usual.is_finite() {
@@ -106,7 +109,7 @@ fn looked_through(raw: &[f64], subject: &str) -> Clock {
     }
     let same = steps().filter(|d| *d == 0.0).count();
     let coarse = same as f64 > 0.1 * raw.len() as f64;
-    let mut scan = Scan::new(raw, usual, coarse);
+    let mut scan = Scan::new(raw, before, usual, coarse);
     for i in 0..raw.len() {
         scan.take(i);
     }
@@ -148,6 +151,7 @@ fn looked_through(raw: &[f64], subject: &str) -> Clock {
         Warning::new(WarningKind::Resampled, subject, message)
     }));
     Clock {
+        before,
         keep: (keep.len() < raw.len()).then_some(keep),
         t,
         step,
@@ -205,7 +209,7 @@ fn evenness(t: &[f64], step: f64) -> (f64, bool, Option<f64>) {
 /// What is wrong with the stamps of a log.
 #[derive(Default)]
 struct Found {
-    /// rows without a time, and the first of them
+    /// rows without a time, and the number of the first of them in the file, from 1, as all rows here
     lost: usize,
     first_lost: Option<usize>,
     /// rows with a stamp far from those around them
@@ -222,6 +226,8 @@ struct Found {
 /// A pass over the stamps.
 struct Scan<'a> {
     raw: &'a [f64],
+    /// rows of the file that come before the first
+    before: usize,
     /// usual step, s
     usual: f64,
     /// whether equal stamps come from a coarse clock
@@ -241,9 +247,10 @@ fn is_time(x: f64) -> bool {
 }
 
 impl<'a> Scan<'a> {
-    fn new(raw: &'a [f64], usual: f64, coarse: bool) -> Self {
+    fn new(raw: &'a [f64], before: usize, usual: f64, coarse: bool) -> Self {
         Scan {
             raw,
+            before,
             usual,
             coarse,
             keep: Vec::with_capacity(raw.len()),
@@ -254,17 +261,23 @@ impl<'a> Scan<'a> {
         }
     }
 
+    /// The number of row `i` in the file, from 1.
+    fn row(&self, i: usize) -> usize {
+        self.before + i + 1
+    }
+
     /// Keeps row `i` and its time, or leaves it out and remembers why.
     fn take(&mut self, i: usize) {
         let x = self.raw[i];
         if !is_time(x) {
             self.found.lost += 1;
-            self.found.first_lost.get_or_insert(i);
+            let row = self.row(i);
+            self.found.first_lost.get_or_insert(row);
             return;
         }
         let now = match self.t.last() {
             None if self.strays(i) => {
-                self.found.wrong.push((i, x));
+                self.found.wrong.push((self.row(i), x));
                 None
             }
             None => Some(x + self.shift),
@@ -305,11 +318,11 @@ impl<'a> Scan<'a> {
         let far = step < -JUMP * usual || step > self.room.max(JUMP) * usual;
         let at_the_end = far && i + 1 == self.raw.len();
         if step.abs() > JUMP * usual && (at_the_end || self.returns(i, last, now)) {
-            self.found.wrong.push((i, x));
+            self.found.wrong.push((self.row(i), x));
             return None;
         }
         if step > JUMP * usual && far {
-            self.found.ahead.push((i, step));
+            self.found.ahead.push((self.row(i), step));
             self.shift -= step - CLOSED * usual;
             return Some(last + CLOSED * usual);
         }
@@ -323,7 +336,7 @@ impl<'a> Scan<'a> {
                     Some(name) => format!("a counter of {name} that wrapped"),
                     None => "a clock that was set back or began anew".into(),
                 };
-                self.found.wrap = format!("by {jump:.6} s at row {}: {what}", i + 1);
+                self.found.wrap = format!("by {jump:.6} s at row {}: {what}", self.row(i));
             }
             self.found.wraps += 1;
             self.shift += jump;
@@ -357,7 +370,7 @@ impl Found {
                 format!(
                     "{} no time stamp: left out, the first is row {}",
                     agreeing(self.lost, "row has", "rows have"),
-                    first + 1
+                    first
                 ),
             );
         }
@@ -367,7 +380,7 @@ impl Found {
                 format!(
                     "{} far from those around; left out with all of the row, the first at row {} ({x:e} s)",
                     agreeing(self.wrong.len(), "time stamp is", "time stamps are"),
-                    row + 1
+                    row
                 ),
             );
         }
@@ -377,7 +390,7 @@ impl Found {
                 format!(
                     "the time jumps ahead by {by:.6} s at row {}{}, by far more than the log is long: the clock \
                      was set, or the recording stopped; the stamps after it were moved back to follow by {CLOSED} steps",
-                    row + 1,
+                    row,
                     more(self.ahead.len())
                 ),
             );
@@ -439,8 +452,8 @@ mod tests {
                 5 => t[0] = 2.7e157,
                 _ => {}
             }
-            if let Some(sound) = sound(&t) {
-                let whole = looked_through(&t, "log");
+            if let Some(sound) = sound(&t, 0) {
+                let whole = looked_through(&t, 0, "log");
                 quick += 1;
                 assert_eq!((sound.keep, sound.t), (whole.keep, whole.t), "case {case}");
                 assert_eq!((sound.step, sound.even), (whole.step, whole.even));
@@ -449,6 +462,6 @@ mod tests {
             }
         }
         assert!((60..400).contains(&quick), "{quick}");
-        assert!(sound(&[1.0]).is_none() && sound(&[2.0, 1.0]).is_none());
+        assert!(sound(&[1.0], 0).is_none() && sound(&[2.0, 1.0], 0).is_none());
     }
 }

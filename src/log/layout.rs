@@ -176,6 +176,7 @@ impl Layout {
     pub fn apply(&mut self, table: &mut Table, joints: &[&Joint], path: &Path) -> Result<Table> {
         let rows = table.rows();
         let mut out = Table {
+            before: table.before,
             warnings: std::mem::take(&mut table.warnings),
             ..Table::default()
         };

@@ -183,7 +183,11 @@ impl Record {
     /// The clock of a log.
     fn clock(table: &Table, path: &Path) -> Clock {
         let at = table.find("t").unwrap_or(0);
-        clock::repair(&table.columns[at], &path.display().to_string())
+        clock::repair(
+            &table.columns[at],
+            table.before,
+            &path.display().to_string(),
+        )
     }
 
     /// A record from the columns of a log, at those times of its clock at which they were taken.
@@ -252,7 +256,7 @@ impl Record {
         });
         drop(table);
 
-        record.drop_impossible(clock.keep.as_deref());
+        record.drop_impossible(&clock);
         record.fill_dropped(&clock)?;
         record.check_channels(&joints)?;
         let duration = clock.t[clock.t.len() - 1] - clock.t[0];

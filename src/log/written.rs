@@ -55,6 +55,7 @@ impl Record {
         let mut table = Table {
             names: vec!["t".into()],
             columns: vec![channels.t],
+            before: 0,
             warnings: Vec::new(),
         };
         for (group, columns) in [

@@ -106,7 +106,7 @@ impl Frame {
                 ((0..rows).map(|i| i as f64).collect::<Vec<f64>>(), "none")
             }
         };
-        let clock = clock::repair(&raw, &subject);
+        let clock = clock::repair(&raw, 0, &subject);
         warnings.extend(
             clock
                 .warnings

@@ -320,7 +320,8 @@ fn parts_side_by_side_are_parts_one_by_one() {
 }
 
 /// Where only a part of a record counts, a log in parts has the rows of the log as a whole, whatever its clock: seconds,
-/// nanoseconds since 1970, or a rate alone. The rows before are passed over in blocks.
+/// nanoseconds since 1970, or a rate alone. The rows before are passed over in blocks. What is wrong is named with its
+/// row in the file.
 #[test]
 fn a_part_of_a_long_record_comes_in_parts() {
     let folder = tempfile::tempdir().unwrap();
@@ -340,7 +341,15 @@ fn a_part_of_a_long_record_comes_in_parts() {
                 _ => format!("{k}"),
             };
             let [q, v] = [(0.9 * t).sin(), (0.9 * t).cos()];
-            text += &format!("{stamp},{q:.9},{v:.9},{:.9},{k}\n", 2.0 * q + v);
+            let last = if k == 220_122 {
+                1_000_000_000_000_000
+            } else {
+                k
+            };
+            text += &format!("{stamp},{q:.9},{v:.9},{:.9},{last}\n", 2.0 * q + v);
+            if k % 50_000 == 77 {
+                text += "# a remark is no row\n";
+            }
         }
         assert!(text.len() > 12_000_000, "several blocks of the reader");
         std::fs::write(&path, text).unwrap();
@@ -368,6 +377,14 @@ fn a_part_of_a_long_record_comes_in_parts() {
             outline.parts(k, 40_000, &mut take).unwrap();
             assert!(parts.len() >= 3, "{clock}: {}", parts.len());
             parts::hold(&parts, whole, clock);
+            let named = |records: &[Record]| -> Vec<String> {
+                let all = records.iter().flat_map(|r| &r.warnings);
+                let rows = all.filter(|w| w.message.contains("at row"));
+                rows.map(|w| w.message.clone()).collect()
+            };
+            let found = named(&parts);
+            assert_eq!(found, named(std::slice::from_ref(whole)), "{clock}");
+            assert!(found.len() == k && found.iter().all(|w| w.contains("at row 220123 ")));
             let times: Vec<f64> = parts.iter().flat_map(|p| p.t.clone()).collect();
             assert!(
                 times

@@ -324,6 +324,7 @@ impl<'a> Collector<'a> {
         let mut table = Table {
             names: vec!["t".into()],
             columns: vec![if set { layout.stamps } else { layout.received }],
+            before: 0,
             warnings,
         };
         table.names.extend(layout.names);

@@ -131,8 +131,11 @@ pub(crate) fn read_parts<T>(
         let early = (skip.as_mut().zip(layout.as_ref()))
             .is_some_and(|(s, (dialect, _))| s.early(text, dialect))
             && given + table.rows() > 0;
+        let mut passed = 0;
         if early {
-            line += text.iter().filter(|b| **b == b'\n').count();
+            let lines = || text.split_inclusive(|b| *b == b'\n');
+            line += lines().count();
+            passed = lines().filter(|l| !idle(l)).count();
         } else if let Some((dialect, keep)) = &layout {
             let cut_off = end && !text.is_empty() && text.last() != Some(&b'\n');
             let text: Cow<[u8]> = match dialect.plain {
@@ -171,6 +174,7 @@ pub(crate) fn read_parts<T>(
                 break 'file;
             }
         }
+        table.before += passed;
         block.copy_within(whole..filled, 0);
         filled -= whole;
         if end {
@@ -278,6 +282,8 @@ impl<'a> Skipping<'a> {
 /// Takes the first rows out of a table; columns that are not kept are empty.
 pub(super) fn first_rows(table: &mut Table, rows: usize) -> Table {
     let columns = table.columns.iter_mut();
+    let before = table.before;
+    table.before += rows;
     Table {
         names: table.names.clone(),
         columns: columns
@@ -288,6 +294,7 @@ pub(super) fn first_rows(table: &mut Table, rows: usize) -> Table {
                 std::mem::replace(c, rest)
             })
             .collect(),
+        before,
         warnings: Vec::new(),
     }
 }

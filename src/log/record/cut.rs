@@ -44,7 +44,7 @@ impl Clock {
             return Err(Error::file(path, "", message));
         }
         let t: Vec<f64> = inside.iter().map(|&i| self.t[i]).collect();
-        let mut again = clock::repair(&t, &path.display().to_string());
+        let mut again = clock::repair(&t, self.before, &path.display().to_string());
         let row = |i: usize| self.keep.as_ref().map_or(i, |k| k[i]);
         again.keep = Some(match &again.keep {
             Some(keep) => keep.iter().map(|&k| row(inside[k])).collect(),
@@ -132,7 +132,7 @@ fn far_ones(y: &[f64]) -> Vec<usize> {
 
 impl Record {
     /// Takes impossible values out, so that they count as dropped; names them with their rows.
-    pub(super) fn drop_impossible(&mut self, rows: Option<&[usize]>) {
+    pub(super) fn drop_impossible(&mut self, clock: &Clock) {
         let path = self.path.display().to_string();
         let mut warnings = Vec::new();
         let channels = self.channels();
@@ -141,7 +141,7 @@ impl Record {
             let Some(&first) = wrong.first() else {
                 continue;
             };
-            let row = rows.map_or(first, |r| r[first]) + 1;
+            let row = clock.before + clock.keep.as_ref().map_or(first, |k| k[first]) + 1;
             let value = column[first];
             for &i in &wrong {
                 column[i] = f64::NAN;
