@@ -11,8 +11,11 @@
 //! a lead `T`, `c` the second and `s` the first difference of the modelled torque,
 //!
 //! ```text
-//! τ − W φ = w c/2 + d s + κ (S(T + h) − S(T))        T ← T + κ h
+//! τ − W φ = w_j c/2 + d s + κ_j (S(T + h) − S(T))        T ← T + h median κ_j
 //! ```
+//!
+//! Window and lead are those of all joints. So each joint gives its own `w_j` and `κ_j`, and the median stands, in which each
+//! counts by its variance: an effect of one joint that no column here has does not move it.
 //!
 //! That friction is no sharp sign of it either: a constraint of softness `(1 − d)/d` gives
 //! `F_c clamp((q̇ + T q̈)/w)` with `w = T F_c (M⁻¹)_jj (1 − d)/d`, which is some hundredths of the speed of a light wrist.
@@ -22,6 +25,8 @@ use super::data::Data;
 use super::evidence::Evidence;
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::inflation;
+use crate::error::Result;
+use crate::median::median;
 use std::borrow::Cow;
 
 /// What the records say of it.
@@ -42,23 +47,25 @@ impl Channel {
         let e = Evidence::new(data, 1.0);
         let phi = e.parameters(&[], &e.fit(&[]));
         let model = data.model_torque(&phi);
-        let curved = data.curvature(&model);
-        let joints = || 0..data.joints();
-        let coarse = joints().any(|j| data.filtered(j));
+        let curved = by_joint(data.curvature(&model));
+        let coarse = (0..data.joints()).any(|j| data.filtered(j));
         // positions that noise is on bend where the torque does not: no window can be seen then
         let found = match coarse {
             true => 0.0,
-            false => e.fit(&[&e.project(std::slice::from_ref(&curved))]).eta[0],
+            false => agreed(&e, &[], curved.clone()).value,
         };
         let (mut lead, mut deviation) = (data.lead, f64::INFINITY);
         if leads {
             let step = T.reversals.step;
-            let all = e.project(&[curved, data.slope(&model), data.earlier(&phi, step)]);
-            let fit = e.fit(&[&all]);
-            let more = (lead + step * fit.eta[2]).clamp(0.0, T.reversals.longest);
-            let sure = step * fit.covariance[2][2].max(0.0).sqrt();
-            deviation = sure * inflation(&e.residual(&[&all], &fit), data.fitted);
-            if more > T.reversals.shortest.max(T.reversals.sure * sure) {
+            let beside = [curved, vec![data.slope(&model)]].concat();
+            let found = agreed(&e, &beside, by_joint(data.earlier(&phi, step)));
+            let more = (lead + step * found.value).clamp(0.0, T.reversals.longest);
+            deviation = step * found.deviation;
+            if more
+                > T.reversals
+                    .shortest
+                    .max(T.reversals.sure * step * found.sure)
+            {
                 lead = more;
             }
         }
@@ -69,6 +76,78 @@ impl Channel {
             phi,
         }
     }
+}
+
+/// Joints from which on one that is off does not decide what they have in common.
+const MOST: usize = 3;
+
+/// A column of each joint that has one; of fewer than three joints one of all.
+fn by_joint(column: Column) -> Vec<Column> {
+    let moving = |x: &[f64]| x.iter().any(|v| *v != 0.0);
+    let rows = column.rows.into_iter().filter(|(_, x)| moving(x));
+    let rows: Vec<(usize, Vec<f64>)> = rows.collect();
+    match rows.len() < MOST {
+        true => vec![Column { rows }],
+        false => rows.into_iter().map(|(j, x)| Column::on(j, x)).collect(),
+    }
+}
+
+/// What columns [`by_joint`] have in common.
+struct Agreed {
+    /// their coefficient, fitted beside others: the median of theirs, each counting by its variance, so that an effect of one
+    /// joint does not move it
+    value: f64,
+    /// its deviation by the noise where one column stands for all joints; else as `deviation`
+    sure: f64,
+    /// its deviation where what the model leaves counts as noise; where the joints disagree as much larger
+    deviation: f64,
+}
+
+fn agreed(e: &Evidence, beside: &[Column], own: Vec<Column>) -> Agreed {
+    let first = beside.len();
+    let all = [beside, &own].concat();
+    let set = e.project(&all);
+    let fit = e.fit(&[&set]);
+    let residual = e.residual(&[&set], &fit);
+    let bare = |k: usize| fit.covariance[k][k].max(0.0).sqrt();
+    if let [_] = own[..] {
+        let sure = bare(first);
+        return Agreed {
+            value: fit.eta[first],
+            sure,
+            deviation: sure * inflation(&residual, e.data.fitted),
+        };
+    }
+    let said = (first..all.len()).filter_map(|k| {
+        let (joint, _) = all[k].rows.first()?;
+        let left = std::slice::from_ref(&residual[*joint]);
+        let sure = bare(k) * inflation(left, e.data.fitted);
+        (fit.eta[k].is_finite() && sure.is_finite() && sure > 0.0).then_some([fit.eta[k], sure])
+    });
+    let [value, deviation] = common(said.collect());
+    Agreed {
+        value,
+        sure: deviation,
+        deviation,
+    }
+}
+
+/// The median of estimates with their deviations, each counting by its variance, and its deviation.
+fn common(mut said: Vec<[f64; 2]>) -> [f64; 2] {
+    let weight = |[_, s]: &[f64; 2]| 1.0 / (s * s);
+    let all: f64 = said.iter().map(weight).sum();
+    said.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut below = 0.0;
+    let half = said.iter().find(|x| {
+        below += weight(x);
+        below >= 0.5 * all
+    });
+    let Some([value, _]) = half else {
+        return [0.0, f64::INFINITY];
+    };
+    let apart = median(said.iter().map(|[x, s]| (x - value).abs() / s));
+    // that median is 0.6745 of a deviation of the normal distribution
+    [*value, (apart / 0.6745).max(1.0) / all.sqrt()]
 }
 
 /// The variance of the window beyond plus and minus one sample, from an estimate: that of an instant where the
@@ -85,18 +164,24 @@ impl Data<'_> {
     /// than `reversals.early`, which a machine may have, counts only where the log looks like a simulator's: coarse
     /// encoders, or no noise. Elsewhere it must also exceed eight deviations of what the model leaves, so that no large
     /// effect passes for it.
-    pub fn find_lead(&mut self) -> bool {
+    ///
+    /// # Errors
+    /// As [`Data::reverse_early`].
+    pub fn find_lead(&mut self) -> Result<bool> {
         if !self.may_lead() {
-            return false;
+            return Ok(false);
         }
         let mut least = T.reversals.early;
         for _ in 0..T.reversals.rounds {
             let Channel {
-                lead, deviation, ..
+                lead,
+                deviation,
+                phi,
+                ..
             } = Channel::of(self, true);
             least = T.reversals.early.max(T.reversals.sure * deviation);
             let done = (lead - self.lead).abs() < T.reversals.settled;
-            self.reverse_early(lead);
+            self.reverse_early(lead, &phi)?;
             if done {
                 break;
             }
@@ -104,9 +189,10 @@ impl Data<'_> {
         let plain = (0..self.joints()).any(|j| self.filtered(j) || self.noise[j].assumed);
         // the longest that is looked for is no time that was found
         if !plain && !(least..T.reversals.longest).contains(&self.lead) {
-            self.reverse_early(0.0);
+            let phi = self.values();
+            self.reverse_early(0.0, &phi)?;
         }
-        plain || self.lead > 0.0
+        Ok(plain || self.lead > 0.0)
     }
 
     /// A modelled signal of all records as the torque channel would show it, whitened.
@@ -214,5 +300,25 @@ impl Data<'_> {
             }
         }
         residual
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One that is far off moves neither the common value nor says that it is sure; where most disagree none is.
+    #[test]
+    fn what_most_say_stands() {
+        let most = [[1.0, 0.1], [1.1, 0.1], [0.9, 0.1], [1.0, 0.2]];
+        let [value, sure] = common(most.to_vec());
+        assert!((value - 1.0).abs() < 1e-12 && sure < 0.1, "{value} {sure}");
+        let one_off = [&most[..], &[[9.0, 0.1]]].concat();
+        let [value, sure] = common(one_off);
+        assert!((value - 1.0).abs() < 0.11 && sure < 0.15, "{value} {sure}");
+        let none_alike = [[0.0, 0.1], [5.0, 0.1], [-4.0, 0.1], [9.0, 0.1]];
+        assert!(common(none_alike.to_vec())[1] > 1.0);
+        assert_eq!(common(vec![[1.0, 0.25]]), [1.0, 0.25]);
+        assert_eq!(common(Vec::new()), [0.0, f64::INFINITY]);
     }
 }

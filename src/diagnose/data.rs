@@ -6,7 +6,7 @@
 use super::column::{Column, Columns};
 use super::noise::{Noise, ORDER};
 use super::prior::{self, Closeness, factors};
-use super::rigid::{moved, rigid};
+use super::rigid::{self, rigid};
 use super::window::{averaged, fine};
 use crate::dynamics::Samples;
 use crate::error::Result;
@@ -43,7 +43,7 @@ pub struct Data<'a> {
     pub weights: Vec<Vec<f64>>,
     /// inertia that an actuator accelerates, about the middle of the motion, kg m² or kg
     pub inertia: Vec<f64>,
-    /// deceleration that its dry friction alone gives an actuator, rad/s² or m/s²; of open chains
+    /// deceleration that its dry friction alone gives an actuator where all positions are zero, rad/s² or m/s²; of trees
     pub stops: Vec<f64>,
     /// variance of the window over which the torque channel averages, beyond plus and minus one
     /// sample, in samples squared; negative where it takes the torque at an instant
@@ -155,7 +155,6 @@ impl<'a> Data<'a> {
                 })
             })
             .collect();
-        let moved = moved(plant, &records[0])?;
         let mut data = Data {
             plant,
             start,
@@ -168,8 +167,8 @@ impl<'a> Data<'a> {
             tau,
             noise: Vec::new(),
             weights: vec![vec![1.0; rows]; n],
-            inertia: moved.inertia,
-            stops: moved.stops,
+            inertia: rigid::inertia(plant, &records[0])?,
+            stops: vec![0.0; n],
             free_load: vec![None; records.len()],
             records,
             window: 0.0,

@@ -125,17 +125,13 @@ fn prepare_with<'a>(
     data.ordinary();
     data.carry(loads)?;
     // what the log makes of a torque, then what the encoders cannot resolve
-    let leads = match lead {
-        Some(lead) => {
-            data.reverse_early(lead);
-            false
-        }
-        None => data.find_lead(),
-    };
+    let phi = data.values();
+    data.reverse_early(lead.unwrap_or(0.0), &phi)?;
+    let leads = lead.is_none() && data.find_lead()?;
     for pass in 0..2 {
         let channel = Channel::of(&data, leads);
         data.window = channel.window;
-        data.reverse_early(channel.lead);
+        data.reverse_early(channel.lead, &channel.phi)?;
         if pass == 0 {
             let residual = data.gap_to(&data.model_torque(&channel.phi));
             data.limit_excess(&residual);

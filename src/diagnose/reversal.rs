@@ -7,8 +7,10 @@
 use super::column::Column;
 use super::data::Data;
 use super::noise::ORDER;
+use super::rigid::mobility;
 use super::thresholds::THRESHOLDS as T;
 use super::window::{fine, sign};
+use crate::error::Result;
 use crate::plant;
 use crate::robot::JointTerm;
 
@@ -159,6 +161,11 @@ impl Data<'_> {
         }
     }
 
+    /// Parameters of the nominal model.
+    pub fn values(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| p.value).collect()
+    }
+
     /// Dry friction of every actuator's own with parameters `phi`, N m or N; 0 where one drive's acts on others.
     fn dry_friction(&self, phi: &[f64]) -> Vec<f64> {
         let actuators = self.plant.actuators();
@@ -190,20 +197,29 @@ impl Data<'_> {
         pairs.map(|(a, b)| a - b)
     }
 
-    /// Takes dry friction to reverse `lead` seconds before the velocity does.
-    pub(super) fn reverse_early(&mut self, lead: f64) {
-        if lead == self.lead {
-            return;
+    /// Takes dry friction to reverse `lead` seconds before the velocity does, and to be as large as the parameters `phi` say
+    /// where it gives way.
+    ///
+    /// # Errors
+    /// As [`super::rigid::mobility`].
+    pub(super) fn reverse_early(&mut self, lead: f64, phi: &[f64]) -> Result<()> {
+        let stops = self.stops(phi)?;
+        if lead == self.lead && (lead == 0.0 || stops == self.stops) {
+            self.stops = stops;
+            return Ok(());
         }
-        let parameters: Vec<usize> = self.dry_parameters().iter().map(|(j, _)| *j).collect();
+        let fitted = self.dry_parameters();
         let stated: Vec<f64> = self.plant.actuators().iter().map(|a| a.terms[2]).collect();
-        let known = |j: &usize| stated[*j] != 0.0 && !parameters.contains(j);
-        for j in (0..self.joints()).filter(known) {
-            let change: Vec<f64> = self.change_of_sign(j, self.lead, lead).collect();
-            let rows = self.known[j].iter_mut().zip(change);
-            rows.for_each(|(k, c)| *k += stated[j] * c);
-        }
+        let known = |j: &usize| stated[*j] != 0.0 && fitted.iter().all(|(k, _)| k != j);
+        let known: Vec<usize> = (0..self.joints()).filter(known).collect();
+        let before: Vec<Vec<f64>> = known.iter().map(|j| self.dry_sign(*j, self.lead)).collect();
         self.lead = lead;
+        self.stops = stops;
+        for (j, before) in known.into_iter().zip(before) {
+            let after = self.dry_sign(j, lead);
+            let rows = self.known[j].iter_mut().zip(after.iter().zip(before));
+            rows.for_each(|(k, (after, before))| *k += stated[j] * (after - before));
+        }
         self.coulomb();
         let slots: Vec<usize> = (0..self.parameters.len())
             .filter(|c| self.parameters[*c].name == REVERSAL)
@@ -214,6 +230,20 @@ impl Data<'_> {
                 self.w[j].write(*c).copy_from_slice(&column);
             }
         }
+        Ok(())
+    }
+
+    /// Deceleration that its dry friction alone gives each actuator where all positions are zero, `F_c (M⁻¹)_jj`. The
+    /// friction is that of `phi`: a nominal one that is 20 % off shifts the lead by 2 ms. The mass matrix is the nominal one, as
+    /// records may not tell the tensor of a last link.
+    fn stops(&self, phi: &[f64]) -> Result<Vec<f64>> {
+        if !self.may_lead() {
+            return Ok(vec![0.0; self.joints()]);
+        }
+        let nominal = self.values();
+        let mobility = mobility(self.plant, &nominal, self.load(0, &nominal).as_ref())?;
+        let friction = self.dry_friction(phi).into_iter();
+        Ok(friction.zip(mobility).map(|(f, a)| f.abs() * a).collect())
     }
 
     /// Weights `1/√(1 + (κ F_c/σ)² b)` of the rows of an actuator: where its velocity changes sign

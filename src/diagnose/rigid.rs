@@ -1,8 +1,9 @@
-//! Torque of rigid bodies alone, the inertia that an actuator accelerates, and how fast friction alone stops it.
+//! Torque of rigid bodies alone, the inertia that an actuator accelerates, and how easily it is moved.
 
 use crate::dynamics::Samples;
 use crate::error::Result;
 use crate::plant::Plant;
+use crate::robot::Joint;
 use crate::signals::series::Series;
 use nalgebra::DMatrix;
 
@@ -25,18 +26,12 @@ pub fn rigid(
     Ok(tau)
 }
 
-/// What the actuators have to move.
-pub struct Moved {
-    /// inertia about each actuator, `√Σ_k M_jk²`, kg m² or kg
-    pub inertia: Vec<f64>,
-    /// deceleration that its dry friction alone gives each actuator, `F_c (M⁻¹)_jj`, rad/s² or m/s²; of open chains
-    pub stops: Vec<f64>,
-}
-
-/// What the actuators have to move, in the mean over points of a motion.
-pub fn moved(plant: &Plant, record: &Series) -> Result<Moved> {
-    let n = plant.actuators().len();
-    let phi = plant.values();
+/// Inertia about each actuator, `√Σ_k M_jk²`, in the mean over points of a motion, kg m² or kg.
+///
+/// # Errors
+/// Poses that cannot be reached.
+pub fn inertia(plant: &Plant, record: &Series) -> Result<Vec<f64>> {
+    let actuators = plant.actuators();
     let m = plant.coordinates();
     const POINTS: usize = 8;
     let at = |i: usize| i * (record.count - 1) / (POINTS - 1);
@@ -46,33 +41,56 @@ pub fn moved(plant: &Plant, record: &Series) -> Result<Moved> {
             x.q[k * POINTS + i] = record.x.q[k * record.count + at(i)];
         }
     }
-    let rest = rigid(plant, &phi, None, &x)?;
-    let mut masses = vec![DMatrix::<f64>::zeros(n, m); POINTS];
-    for k in 0..m {
-        let mut y = x.clone();
-        y.qdd[k * POINTS..(k + 1) * POINTS].fill(1.0);
-        let tau = rigid(plant, &phi, None, &y)?;
-        for j in 0..n {
-            for i in 0..POINTS {
-                masses[i][(j, k)] = tau[j * POINTS + i] - rest[j * POINTS + i];
-            }
-        }
-    }
-    let actuators = plant.actuators();
+    let masses = masses(plant, &plant.values(), None, &x)?;
     let squared = |j: usize, k: usize| -> f64 {
         masses.iter().map(|mass| mass[(j, k)].powi(2)).sum::<f64>() / POINTS as f64
     };
-    let inertia = (0..n)
-        .map(|j| (0..m).map(|k| squared(j, k)).sum::<f64>().sqrt() + actuators[j].terms[0])
-        .collect();
-    let mut stops = vec![0.0; n];
-    for mut mass in masses.into_iter().filter(DMatrix::is_square) {
-        (0..n).for_each(|j| mass[(j, j)] += actuators[j].terms[0]);
-        let Some(inverse) = mass.try_inverse() else {
-            continue;
-        };
-        let each = stops.iter_mut().zip(&actuators).enumerate();
-        each.for_each(|(j, (s, a))| *s += a.terms[2].abs() * inverse[(j, j)] / POINTS as f64);
+    let of =
+        |(j, a): (usize, &&Joint)| (0..m).map(|k| squared(j, k)).sum::<f64>().sqrt() + a.terms[0];
+    Ok(actuators.iter().enumerate().map(of).collect())
+}
+
+/// Acceleration of each actuator by a unit of its torque where all positions are zero, `(M⁻¹)_jj`, with a load or
+/// none: from it MuJoCo takes how soft its dry friction is (`dof_invweight0`). 0 where there are not as many actuators as
+/// coordinates.
+///
+/// # Errors
+/// As [`rigid`].
+pub fn mobility(plant: &Plant, phi: &[f64], load: Option<&[f64; 10]>) -> Result<Vec<f64>> {
+    let actuators = plant.actuators();
+    let n = actuators.len();
+    let x = Samples::zeros(plant.coordinates(), 1);
+    let mut mass = masses(plant, phi, load, &x)?.swap_remove(0);
+    if !mass.is_square() {
+        return Ok(vec![0.0; n]);
     }
-    Ok(Moved { inertia, stops })
+    (0..n).for_each(|j| mass[(j, j)] += actuators[j].terms[0]);
+    let inverse = mass.try_inverse();
+    Ok(inverse.map_or(vec![0.0; n], |inverse| {
+        (0..n).map(|j| inverse[(j, j)].max(0.0)).collect()
+    }))
+}
+
+/// Mass matrix at each sample of a motion without velocity, without rotors: a row for each actuator, a column for each
+/// coordinate.
+fn masses(
+    plant: &Plant,
+    phi: &[f64],
+    load: Option<&[f64; 10]>,
+    x: &Samples,
+) -> Result<Vec<DMatrix<f64>>> {
+    let (n, m, count) = (plant.actuators().len(), plant.coordinates(), x.count);
+    let rest = rigid(plant, phi, load, x)?;
+    let mut masses = vec![DMatrix::<f64>::zeros(n, m); count];
+    for k in 0..m {
+        let mut y = x.clone();
+        y.qdd[k * count..(k + 1) * count].fill(1.0);
+        let tau = rigid(plant, phi, load, &y)?;
+        for j in 0..n {
+            for i in 0..count {
+                masses[i][(j, k)] = tau[j * count + i] - rest[j * count + i];
+            }
+        }
+    }
+    Ok(masses)
 }

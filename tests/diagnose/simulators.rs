@@ -143,25 +143,28 @@ fn every_effect_in_mujoco_swinging() {
 }
 
 /// A delay and the time by which MuJoCo's dry friction reverses early are nearly the same: beside a large drag the records
-/// settled at 11.5 ms and a delay of 2.3 ms, which the arm does not have.
+/// settled at 11.5 ms and a delay of 2.3 ms, which the arm does not have. Beside a cable, with friction that is not that of the
+/// robot file, they did at 11.2 ms and a delay of 1.3 ms.
 #[test]
-fn early_friction_of_mujoco_beside_a_large_drag_is_no_delay() {
+fn early_friction_of_mujoco_beside_a_large_effect_is_no_delay() {
     let Some(python) = python::with("mujoco, numpy") else {
         return;
     };
-    let folder = tempfile::tempdir().unwrap();
-    let out = Command::new(python)
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mujoco_arms.py"))
-        .args(["--seed", "2", "--only", "13", "--excite"])
-        .arg(env!("CARGO_BIN_EXE_excite"))
-        .arg("--output")
-        .arg(folder.path())
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&out.stdout);
-    assert!(out.status.success(), "{said}");
-    assert!(
-        said.ends_with("1 of 1 hidden effects named; 0 wrong names\n"),
-        "{said}"
-    );
+    for (seed, arm) in [("2", "13"), ("4", "24")] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Command::new(&python)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mujoco_arms.py"))
+            .args(["--seed", seed, "--only", arm, "--excite"])
+            .arg(env!("CARGO_BIN_EXE_excite"))
+            .arg("--output")
+            .arg(folder.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&out.stdout);
+        assert!(out.status.success(), "{said}");
+        assert!(
+            said.ends_with("1 of 1 hidden effects named; 0 wrong names\n"),
+            "{said}"
+        );
+    }
 }
