@@ -234,16 +234,21 @@ impl Data<'_> {
     }
 
     /// Deceleration that its dry friction alone gives each actuator where all positions are zero, `F_c (M⁻¹)_jj`. The
-    /// friction is that of `phi`: a nominal one that is 20 % off shifts the lead by 2 ms. The mass matrix is the nominal one, as
-    /// records may not tell the tensor of a last link.
+    /// friction is that of `phi`: a nominal one that is 20 % off shifts the lead by 2 ms. It stays near the nominal one, as
+    /// what a model lacks can look like any friction. The mass matrix is nominal: records may not tell the tensor of a last link.
     fn stops(&self, phi: &[f64]) -> Result<Vec<f64>> {
         if !self.may_lead() {
             return Ok(vec![0.0; self.joints()]);
         }
         let nominal = self.values();
         let mobility = mobility(self.plant, &nominal, self.load(0, &nominal).as_ref())?;
-        let friction = self.dry_friction(phi).into_iter();
-        Ok(friction.zip(mobility).map(|(f, a)| f.abs() * a).collect())
+        let stated = self.dry_friction(&nominal).into_iter().map(f64::abs);
+        let fitted = self.dry_friction(phi).into_iter().zip(stated);
+        let near = |(f, stated): (f64, f64)| {
+            let most = T.reversals.trusted * stated;
+            f.abs().clamp(stated - most, stated + most)
+        };
+        Ok(fitted.map(near).zip(mobility).map(|(f, a)| f * a).collect())
     }
 
     /// Weights `1/√(1 + (κ F_c/σ)² b)` of the rows of an actuator: where its velocity changes sign

@@ -176,6 +176,9 @@ pub struct Reversals {
     /// Part of the deceleration by dry friction alone by which a simulator's friction gives way, `(1 − d)/d`. Unit: share.
     /// Source: MuJoCo's default `solimp`, `d` = 0.9.
     pub soft: f64,
+    /// How far the refitted dry friction may be from that of the robot file where it says how soft it is, over the latter.
+    /// Unit: share. Source: by hand; friction of CAD files is some tenths off.
+    pub trusted: f64,
     /// Change of such a time below which it is not looked for again. Unit: s. Source: by hand.
     pub settled: f64,
     /// Rounds in which it is looked for. Unit: count. Source: by hand.
@@ -202,6 +205,7 @@ pub(super) const REVERSALS: Reversals = Reversals {
     early: 0.006,
     usual: 0.0095,
     soft: 1.0 / 9.0,
+    trusted: 0.5,
     settled: 5e-4,
     rounds: 5,
     sure: 8.0,
