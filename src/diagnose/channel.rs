@@ -22,7 +22,7 @@
 
 use super::column::Column;
 use super::data::Data;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Projected};
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::inflation;
 use crate::error::Result;
@@ -47,25 +47,23 @@ impl Channel {
         let e = Evidence::new(data, 1.0);
         let phi = e.parameters(&[], &e.fit(&[]));
         let model = data.model_torque(&phi);
-        let curved = by_joint(data.curvature(&model));
+        let curved = e.project(&by_joint(data.curvature(&model)));
         let coarse = (0..data.joints()).any(|j| data.filtered(j));
         // positions that noise is on bend where the torque does not: no window can be seen then
         let found = match coarse {
             true => 0.0,
-            false => agreed(&e, &[], curved.clone()).value,
+            false => agreed(&e, &[], &curved).value,
         };
         let (mut lead, mut deviation) = (data.lead, f64::INFINITY);
         if leads {
             let step = T.reversals.step;
-            let beside = [curved, vec![data.slope(&model)]].concat();
-            let found = agreed(&e, &beside, by_joint(data.earlier(&phi, step)));
+            let slope = e.project(&[data.slope(&model)]);
+            let earlier = e.project(&by_joint(data.earlier(&phi, step)));
+            let found = agreed(&e, &[&curved, &slope], &earlier);
             let more = (lead + step * found.value).clamp(0.0, T.reversals.longest);
             deviation = step * found.deviation;
-            if more
-                > T.reversals
-                    .shortest
-                    .max(T.reversals.sure * step * found.sure)
-            {
+            let sure = T.reversals.sure * step * found.sure;
+            if more > T.reversals.shortest.max(sure) {
                 lead = more;
             }
         }
@@ -79,14 +77,14 @@ impl Channel {
 }
 
 /// Joints from which on one that is off does not decide what they have in common.
-const MOST: usize = 3;
+const JOINTS: usize = 3;
 
 /// A column of each joint that has one; of fewer than three joints one of all.
 fn by_joint(column: Column) -> Vec<Column> {
     let moving = |x: &[f64]| x.iter().any(|v| *v != 0.0);
     let rows = column.rows.into_iter().filter(|(_, x)| moving(x));
     let rows: Vec<(usize, Vec<f64>)> = rows.collect();
-    match rows.len() < MOST {
+    match rows.len() < JOINTS {
         true => vec![Column { rows }],
         false => rows.into_iter().map(|(j, x)| Column::on(j, x)).collect(),
     }
@@ -94,7 +92,7 @@ fn by_joint(column: Column) -> Vec<Column> {
 
 /// What columns [`by_joint`] have in common.
 struct Agreed {
-    /// their coefficient, fitted beside others: the median of theirs, each counting by its variance, so that an effect of one
+    /// their coefficient: the median of theirs, each counting by its variance, so that an effect of one
     /// joint does not move it
     value: f64,
     /// its deviation by the noise where one column stands for all joints; else as `deviation`
@@ -103,14 +101,14 @@ struct Agreed {
     deviation: f64,
 }
 
-fn agreed(e: &Evidence, beside: &[Column], own: Vec<Column>) -> Agreed {
-    let first = beside.len();
-    let all = [beside, &own].concat();
-    let set = e.project(&all);
-    let fit = e.fit(&[&set]);
-    let residual = e.residual(&[&set], &fit);
+/// What columns [`by_joint`] have in common, fitted `beside` others.
+fn agreed(e: &Evidence, beside: &[&Projected], own: &Projected) -> Agreed {
+    let set = [beside, &[own]].concat();
+    let fit = e.fit(&set);
+    let residual = e.residual(&set, &fit);
+    let first: usize = beside.iter().map(|a| a.z.len()).sum();
     let bare = |k: usize| fit.covariance[k][k].max(0.0).sqrt();
-    if let [_] = own[..] {
+    if let [_] = own.z[..] {
         let sure = bare(first);
         return Agreed {
             value: fit.eta[first],
@@ -118,8 +116,8 @@ fn agreed(e: &Evidence, beside: &[Column], own: Vec<Column>) -> Agreed {
             deviation: sure * inflation(&residual, e.data.fitted),
         };
     }
-    let said = (first..all.len()).filter_map(|k| {
-        let (joint, _) = all[k].rows.first()?;
+    let said = own.z.iter().zip(first..).filter_map(|(column, k)| {
+        let (joint, _) = column.rows.first()?;
         let left = std::slice::from_ref(&residual[*joint]);
         let sure = bare(k) * inflation(left, e.data.fitted);
         (fit.eta[k].is_finite() && sure.is_finite() && sure > 0.0).then_some([fit.eta[k], sure])

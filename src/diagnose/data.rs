@@ -72,6 +72,11 @@ impl<'a> Data<'a> {
         self.start[self.records.len()]
     }
 
+    /// Parameters of the nominal model.
+    pub fn values(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| p.value).collect()
+    }
+
     /// Whether anything moves in the fitted records.
     pub fn moves(&self) -> bool {
         self.records.iter().any(|r| r.fit && r.moves())

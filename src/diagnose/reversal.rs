@@ -161,11 +161,6 @@ impl Data<'_> {
         }
     }
 
-    /// Parameters of the nominal model.
-    pub fn values(&self) -> Vec<f64> {
-        self.parameters.iter().map(|p| p.value).collect()
-    }
-
     /// Dry friction of every actuator's own with parameters `phi`, N m or N; 0 where one drive's acts on others.
     fn dry_friction(&self, phi: &[f64]) -> Vec<f64> {
         let actuators = self.plant.actuators();

@@ -16,7 +16,7 @@ impl<'a> Evidence<'a> {
         let n = data.joints();
         let p = data.parameters.len();
         let fitted = data.fitted;
-        let phi: Vec<f64> = data.values();
+        let phi = data.values();
         // a parameter that is exactly zero a priori must still be able to move
         let floor = 1e-9;
         let spread: Vec<f64> = data
