@@ -9,7 +9,7 @@ use super::evidence::Evidence;
 use super::search::{Candidate, singles};
 use super::settle::settled;
 use super::thresholds::THRESHOLDS as T;
-use super::verdict::{Decision, Verdict, decide, inflation};
+use super::verdict::{Decision, Member, Verdict, decide, inflation};
 use crate::error::Result;
 
 /// What the search found in records.
@@ -53,21 +53,24 @@ impl<'a> Searched<'a> {
     /// found.
     pub fn may_be_early(&self, effects: &[Box<dyn Effect>]) -> bool {
         let data = self.evidence.data;
-        data.may_lead() && data.lead != T.reversals.usual && self.late(effects)
+        data.may_lead() && data.lead != T.reversals.usual && self.late(effects) > 0
     }
 
-    /// Whether it explains the records without the effect that the other claims: as well as what that one leaves allows, or
-    /// all that counts, where the other took friction to reverse early, too.
+    /// Whether it explains the records with fewer of the effects that the other claims: as well as what that one leaves
+    /// allows, or, without any of them, all that counts, where the other took friction to reverse early, too.
     pub fn stands_for(&self, other: &Searched, effects: &[Box<dyn Effect>]) -> bool {
         let all = matches!(self.decision.verdict, Verdict::NoGap | Verdict::Explained);
         let as_well = || self.left() < other.left() + other.margin();
-        !self.late(effects) && (all && other.evidence.data.lead > 0.0 || as_well())
+        let late = self.late(effects);
+        let none = late == 0 && all && other.evidence.data.lead > 0.0;
+        late < other.late(effects) && (none || as_well())
     }
 
-    /// Whether it claims an effect that dry friction that reverses early may pass for.
-    fn late(&self, effects: &[Box<dyn Effect>]) -> bool {
-        let mut members = self.decision.members.iter();
-        members.any(|m| m.together >= T.confidence.claim && effects[m.candidate.effect].late())
+    /// How many effects it claims that dry friction that reverses early may pass for.
+    fn late(&self, effects: &[Box<dyn Effect>]) -> usize {
+        let late =
+            |m: &&Member| m.together >= T.confidence.claim && effects[m.candidate.effect].late();
+        self.decision.members.iter().filter(late).count()
     }
 
     /// `χ²` with the set that was found.

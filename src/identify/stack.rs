@@ -37,8 +37,8 @@ pub struct Stack {
     pub left_out: Vec<bool>,
 }
 
-/// Samples of the motion that a thread works on at least.
-const BLOCK: usize = 4096;
+/// Samples of the motion that a thread works on at least: few enough for what they make to stay near the processor.
+const BLOCK: usize = 512;
 
 /// A block of outputs: their columns one after the other, and the known torque.
 struct Part {
@@ -72,7 +72,7 @@ impl Stack {
         // where the columns are smooth, fewer samples hold them
         let thin = p.thin.as_ref().zip(jumps.as_deref());
         let (stride, filter) = thin.map_or((1, &p.filter), |(t, _)| (t.stride, &t.filter));
-        let each = (BLOCK.max(4 * filter.reach()) / filter.factor).max(16);
+        let each = (BLOCK.max(8 * filter.reach()) / filter.factor).max(16);
         let ranges: Vec<_> = (0..m)
             .step_by(each)
             .map(|from| from..(from + each).min(m))

@@ -161,12 +161,19 @@ fn looked_through(raw: &[f64], before: usize, subject: &str) -> Clock {
     }
 }
 
-/// Stamps of a coarse clock at even distances, the first and the last where they are.
+/// Stamps of a coarse clock at even distances: where it goes on for the first and for the last time it is right; in which
+/// part of a stamp the record begins and ends nobody knows.
 fn spread(t: &mut [f64]) {
-    let (a, b, n) = (t[0], t[t.len() - 1], t.len() - 1);
+    let mut on = (1..t.len()).filter(|&i| t[i] > t[i - 1]);
+    let (from, to) = match (on.next(), on.next_back()) {
+        (Some(a), Some(b)) => (a, b),
+        _ => (0, t.len() - 1),
+    };
+    let (a, b) = (t[from], t[to]);
+    let step = (b - a) / (to - from) as f64;
     t.iter_mut()
         .enumerate()
-        .for_each(|(i, x)| *x = a + (b - a) * i as f64 / n as f64);
+        .for_each(|(i, x)| *x = a + (i as f64 - from as f64) * step);
 }
 
 /// From and to of each step that is far too long.

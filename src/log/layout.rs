@@ -87,16 +87,26 @@ pub(crate) fn time_unit(t: &[f64]) -> (f64, &'static str) {
             .filter(|d| d.is_finite() && *d > 0.0),
     );
     let first = crate::median::median(t.iter().copied().filter(|x| x.abs() < 1e21));
+    // rows that a coarse clock gives one stamp lie closer
+    let [on, same] = t.windows(2).fold([0usize; 2], |[on, same], w| {
+        [
+            on + usize::from(w[1] > w[0]),
+            same + usize::from(w[1] == w[0]),
+        ]
+    });
+    let each = 1.0 + same as f64 / on.max(1) as f64;
     // the time since 1970, between 2001 and 2100
     for (factor, name) in [(1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns")] {
         let since = first * factor;
-        let sound = (STEPS[0]..=STEPS[1]).contains(&(step * factor));
+        let sound = (STEPS[0]..=STEPS[1]).contains(&(step / each * factor));
         if (1e9..4.1e9).contains(&since) && sound {
             return (factor, name);
         }
     }
     match step {
         d if d < 0.4 => (1.0, "s"),
+        // closer than a log in milliseconds has them
+        d if d < 400.0 && d / each * 1e-3 < STEPS[0] => (1.0, "s"),
         d if d < 400.0 => (1e-3, "ms"),
         d if d < 4e5 => (1e-6, "us"),
         d if d.is_finite() => (1e-9, "ns"),
@@ -109,11 +119,7 @@ impl Layout {
     pub fn of_names(table: &Table, format: Format, joints: &[&Joint], path: &Path) -> Result<Self> {
         let n = joints.len();
         let own: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
-        let all: Vec<Option<names::Named>> = table
-            .names
-            .iter()
-            .map(|name| names::named(name, format))
-            .collect();
+        let all = names::all(&table.names, &table.labels, format);
         let mut out = Layout::default();
         let time = all
             .iter()

@@ -3,6 +3,7 @@
 use super::Table;
 use super::formats::{Format, Read};
 use super::layout::{Layout, Time, time_unit};
+use super::names::{self, Quantity};
 use super::resample::{Order, interpolate};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
@@ -11,10 +12,10 @@ impl Layout {
     /// The time by the names of the columns.
     pub(crate) fn time_of(table: &Table, format: Format) -> Option<Time> {
         let (k, named) = table.names.iter().enumerate().find_map(|(k, name)| {
-            let named = super::names::named(name, format)?;
-            (named.quantity == super::names::Quantity::Time).then_some((k, named))
+            let named = names::named(name, format)?;
+            (named.quantity == Quantity::Time).then_some((k, named))
         })?;
-        let factor = named.unit.and_then(super::names::unit).map(|(_, f)| f);
+        let factor = named.unit.and_then(names::unit).map(|(_, f)| f);
         Some(Time::Column(super::place::Place::Number(k + 1), factor))
     }
 }
@@ -30,8 +31,36 @@ fn time(table: &Table, format: Format) -> Option<(usize, f64)> {
     }
 }
 
-/// One table of all. Columns that several files have are called `FILE.COLUMN` in all but the first.
-pub(crate) fn merge(parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
+/// Calls the columns of files `FILE.COLUMN` where the names of the files say what they hold, each something else, and those of
+/// their columns do not: `q.csv`, `dq.csv` and `current_mA.csv`, each with the names of the joints.
+pub(crate) fn call_by_files(parts: &mut [(PathBuf, Read)]) {
+    let says = |name: &str, format| names::named(name, format).map(|n| n.quantity);
+    let holds = |name: &str, format| says(name, format).filter(|q| *q != Quantity::Time);
+    let stems: Vec<(String, Option<Quantity>)> = parts
+        .iter()
+        .map(|(path, part)| {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+            let own = |n: &String| holds(n, part.format).is_some();
+            let known = part.table.names.iter().any(own);
+            let quantity = holds(&stem, part.format).filter(|_| !known);
+            (stem.into_owned(), quantity)
+        })
+        .collect();
+    let distinct = |k: usize| !stems[..k].iter().any(|s| s.1 == stems[k].1);
+    if stems.len() < 2 || !(0..stems.len()).all(|k| stems[k].1.is_some() && distinct(k)) {
+        return;
+    }
+    for ((_, part), (stem, _)) in parts.iter_mut().zip(stems) {
+        let format = part.format;
+        let own = part.table.names.iter_mut();
+        own.filter(|n| says(n, format) != Some(Quantity::Time))
+            .for_each(|n| *n = format!("{stem}.{n}"));
+    }
+}
+
+/// One table of all. Columns that several files have are called `FILE.COLUMN` in all but the first, or [in all](call_by_files).
+pub(crate) fn merge(mut parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
+    call_by_files(&mut parts);
     let mut parts = parts.into_iter();
     let Some((_, first)) = parts.next() else {
         return Err(Error::Argument("no log is named".into()));
@@ -77,6 +106,7 @@ pub(crate) fn merge(parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
             });
             table.columns.push(values);
         }
+        table.labels.append(&mut more.labels);
         table.warnings.append(&mut more.warnings);
     }
     Ok((table, format))

@@ -103,30 +103,24 @@ fn commands(word: &str) -> bool {
     )
 }
 
-/// Words of what is no quantity of one joint as measured.
-fn foreign(word: &str) -> bool {
+/// Words of what is no quantity of one joint.
+fn elsewhere(word: &str) -> bool {
     matches!(
         word,
-        "ext"
-            | "external"
-            | "error"
-            | "err"
-            | "tcp"
+        "tcp"
+            | "tcps"
+            | "tcpf"
             | "temp"
             | "temperature"
             | "voltage"
-            | "std"
-            | "hat"
             | "mode"
             | "status"
+            | "scaling"
             | "wrench"
             | "cartesian"
             | "tool"
             | "ee"
             | "success"
-            | "dtau"
-            | "theta"
-            | "dtheta"
             | "limit"
             | "stiffness"
             | "damping"
@@ -138,6 +132,20 @@ fn foreign(word: &str) -> bool {
             | "id"
             | "seq"
     )
+}
+
+/// … of one joint as measured.
+fn foreign(word: &str) -> bool {
+    let other = matches!(
+        word,
+        "ext" | "external" | "error" | "err" | "std" | "hat" | "dtau" | "theta" | "dtheta"
+    );
+    other || elsewhere(word)
+}
+
+/// Whether a name is that of no quantity of a joint, whatever its numbers look like.
+pub(crate) fn of_no_joint(name: &str) -> bool {
+    words(name).iter().any(|w| elsewhere(w))
 }
 
 /// Words that say nothing of which joint it is.
@@ -207,12 +215,19 @@ fn time(name: &str) -> Option<Option<&'static str>> {
         matches!(
             w,
             "t" | "time"
+                | "ts"
                 | "timestamp"
                 | "timestamps"
                 | "stamp"
                 | "clock"
                 | "elapsed"
                 | "header"
+                | "pc"
+                | "host"
+                | "ros"
+                | "robot"
+                | "epoch"
+                | "utc"
                 | "s"
                 | "sec"
                 | "secs"
@@ -232,6 +247,7 @@ fn time(name: &str) -> Option<Option<&'static str>> {
         matches!(
             w.as_str(),
             "t" | "time"
+                | "ts"
                 | "timestamp"
                 | "timestamps"
                 | "stamp"
@@ -250,6 +266,39 @@ fn time(name: &str) -> Option<Option<&'static str>> {
         _ => None,
     });
     (time && words.iter().all(|w| known(w))).then_some(unit)
+}
+
+/// What the names of all columns say. Where columns of texts, the `labels`, hold the names of joints, as `name0` beside
+/// `position0`, or the list `name` beside the list `position`, columns with the same number are of those joints.
+pub(crate) fn all(names: &[String], labels: &[[String; 2]], format: Format) -> Vec<Option<Named>> {
+    let mut out: Vec<Option<Named>> = names.iter().map(|n| named(n, format)).collect();
+    // what is left of a name, so that those of one message are told from others
+    let rest = |name: &str, what: fn(&str) -> bool| -> Vec<String> {
+        let all = words(name).into_iter();
+        all.filter(|w| !what(w) && !idle(w) && w.parse::<usize>().is_err())
+            .collect()
+    };
+    let calls: fn(&str) -> bool = |w| matches!(w, "name" | "names");
+    for [label, joint] in labels {
+        let parts = words(label);
+        let Some(number) = number(&parts).filter(|_| parts.iter().any(|w| calls(w))) else {
+            continue;
+        };
+        let message = rest(label, calls);
+        for (name, named) in names.iter().zip(&mut out) {
+            let Some(named) = named else { continue };
+            let own = named.number == Some(number) && named.joint.is_none();
+            if own && rest(name, |w| quantity(w).is_some() || commands(w)) == message {
+                named.joint = Some(joint.clone());
+            }
+        }
+    }
+    out
+}
+
+/// The last number of a name.
+fn number(words: &[String]) -> Option<usize> {
+    words.iter().rev().find_map(|w| w.parse().ok())
 }
 
 /// What a name says, if anything.
@@ -285,7 +334,9 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
         return plain(Quantity::Other, None, None, None);
     }
     let words = words(name);
-    let at = words.iter().position(|w| quantity(w).is_some())?;
+    let Some(at) = words.iter().position(|w| quantity(w).is_some()) else {
+        return by_unit(name, &words);
+    };
     let mut what = quantity(&words[at])?;
     let desired = format == Format::Libfranka
         && (words.get(at + 1).is_some_and(|w| w == "d")
@@ -307,7 +358,7 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
     if what == Quantity::Current && words.iter().any(|w| w == "torque") {
         what = Quantity::Torque;
     }
-    let number = words.iter().rev().find_map(|w| w.parse::<usize>().ok());
+    let number = number(&words);
     let rest: Vec<&str> = words
         .iter()
         .map(String::as_str)
@@ -322,6 +373,30 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
     plain(what, joint, number, unit_of(name, what, format))
 }
 
+/// What a name says that is no more than the number of a joint, as `A1 [deg]`: its unit tells. `AXIS_ACT.A1` is what KUKA calls
+/// a position.
+fn by_unit(name: &str, words: &[String]) -> Option<Named> {
+    let number = number(words)?;
+    let unit = in_brackets(name);
+    let quantity = match unit {
+        _ if words.windows(2).any(|w| w[0] == "axis" && w[1] == "act") => Quantity::Position,
+        Some("rad" | "deg" | "rev") => Quantity::Position,
+        Some("rad/s" | "deg/s" | "rev/s" | "rpm") => Quantity::Velocity,
+        Some("rad/s^2" | "deg/s^2") => Quantity::Acceleration,
+        Some("N m" | "Nm" | "mNm") => Quantity::Torque,
+        Some("A" | "mA") => Quantity::Current,
+        _ => return None,
+    };
+    let before = name.split(['[', '(']).next().unwrap_or(name);
+    let plain = |w: &String| idle(w) || w.parse::<usize>().is_ok();
+    self::words(before).iter().all(plain).then_some(Named {
+        quantity,
+        joint: None,
+        number: Some(number),
+        unit,
+    })
+}
+
 /// Of a path such as `/joint_states/elbow/position` the part that names the joint.
 fn joint_part(name: &str) -> String {
     let says = |part: &&str| {
@@ -334,12 +409,15 @@ fn joint_part(name: &str) -> String {
     part.unwrap_or(name).to_string()
 }
 
+/// The unit that stands in brackets at the end of a name.
+fn in_brackets(name: &str) -> Option<&'static str> {
+    let (_, rest) = name.rsplit_once(['[', '('])?;
+    unit(rest.trim_end_matches([']', ')'])).map(|(u, _)| u)
+}
+
 /// The unit that stands in a name, in brackets or at its end; of Kortex degrees.
 fn unit_of(name: &str, quantity: Quantity, format: Format) -> Option<&'static str> {
-    let bracket = name
-        .rsplit_once(['[', '('])
-        .and_then(|(_, rest)| unit(rest.trim_end_matches([']', ')'])))
-        .map(|(u, _)| u);
+    let bracket = in_brackets(name);
     let low = name.to_lowercase();
     let angle = matches!(
         quantity,

@@ -11,6 +11,8 @@ pub struct Table {
     pub names: Vec<String>,
     /// one column a name; NaN where a value was dropped
     pub columns: Vec<Vec<f64>>,
+    /// columns of texts that hold the same one throughout: their names, and what they hold
+    pub labels: Vec<[String; 2]>,
     /// rows of the file that come before the first; not zero in a part of a long log
     pub before: usize,
     /// what was imperfect

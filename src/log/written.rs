@@ -55,8 +55,7 @@ impl Record {
         let mut table = Table {
             names: vec!["t".into()],
             columns: vec![channels.t],
-            before: 0,
-            warnings: Vec::new(),
+            ..Table::default()
         };
         for (group, columns) in [
             ("q", channels.q),

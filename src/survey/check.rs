@@ -67,8 +67,10 @@ fn frame(record: &Record, plant: &Plant) -> (Frame, Vec<Claim>) {
     let mut frame = Frame {
         paths: vec![record.path.clone()],
         rows: record.len(),
+        labels: Vec::new(),
         names: vec!["t".into()],
         time: Some(0),
+        rate: None,
         time_unit: "s",
         step: record.step,
         columns: vec![record.t.clone()],

@@ -1,5 +1,7 @@
 //! What a column means, and how sure that is.
 
+use crate::log::names;
+
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -35,6 +37,9 @@ pub struct Claim {
     /// the column of positions whose derivative or command it is
     #[serde(skip)]
     pub of: Option<usize>,
+    /// whether its name is that of something else than a joint has
+    #[serde(skip)]
+    pub of_no_joint: bool,
     /// name of the joint
     pub joint: Option<String>,
     /// 1 or -1
@@ -67,6 +72,7 @@ impl Claim {
             means: Means::Other,
             at: None,
             of: None,
+            of_no_joint: names::of_no_joint(column),
             joint: None,
             sign: 1.0,
             sign_known: true,
@@ -84,6 +90,11 @@ impl Claim {
     /// What makes a value one of the joint in SI units.
     pub fn factor(&self) -> f64 {
         self.sign * self.scale
+    }
+
+    /// Whether nothing is claimed yet, and its numbers may tell what it is.
+    pub(super) fn free(&self) -> bool {
+        self.means == Means::Other && !self.of_no_joint
     }
 
     /// Takes the claim back: what was said before is only evidence.

@@ -1,14 +1,18 @@
 //! What is stated, against what the torques say.
 
 use super::claim::{Claim, Means};
+use super::families::{OF_OTHERS, alike};
 use super::search::{Hypothesis, Problem};
-use super::verdict::{SHARE, Verdict, contradicts, explained};
+use super::verdict::{MATERIAL, SHARE, Verdict, contradicts, explained};
 use crate::dynamics::Workspace;
 use crate::error::{Warning, WarningKind};
+use crate::log::names;
 use crate::plant::Plant;
 
 /// States, and their seed, that a joint is weighed by.
 const STATES: (usize, u64) = (100, 0x11_67);
+/// How far a claim is believed that the torques contradict.
+const DOUBTED: f64 = 0.3;
 /// Torque of a joint, as a share of the largest of the robot, below which a sign alone is not judged by it: friction
 /// and armature that the model lacks are as large.
 const LIGHT: f64 = 0.05;
@@ -100,9 +104,14 @@ pub(super) fn contradict(
                 claims[stated_k].column
             ),
         ));
-        claims[stated_k].confidence = 0.3;
+        for (k, c) in claims.iter_mut().enumerate() {
+            if k == stated_k || c.of == Some(stated_k) {
+                c.confidence = c.confidence.min(DOUBTED);
+            }
+        }
     }
     // signs and gains of stated torques
+    let mut told = Vec::new();
     for (c, &k) in torques.iter().enumerate() {
         let Some(j) = claims[k]
             .at
@@ -113,6 +122,13 @@ pub(super) fn contradict(
         let Some(m) = matches.get(j).map(|r| r[c]) else {
             continue;
         };
+        // with the positions as the torques want them, another joint may explain this column
+        let most = matches.iter().map(|r| r[c].share).fold(0.0, f64::max);
+        if differs && verdict.torque[c] && 1.0 - most < MATERIAL * (1.0 - m.share) {
+            claims[k].confidence = claims[k].confidence.min(DOUBTED);
+            claims[k].evidence +=
+                "; with other positions the torque of another joint is clearly nearer to it";
+        }
         if differs || m.rigid < 0.5 || m.share < SHARE {
             continue;
         }
@@ -120,6 +136,7 @@ pub(super) fn contradict(
         if claims[k].means == Means::Current {
             claims[k].sign = m.gain.signum();
             claims[k].scale = 1.0 / m.gain.abs();
+            told.push(k);
             claims[k]
                 .evidence
                 .push_str("; gain from the nominal model, good to a few parts in ten");
@@ -140,5 +157,23 @@ pub(super) fn contradict(
         if m.weightless && m.rigid > 0.8 {
             claims[k].without = vec!["gravity"];
         }
+    }
+    others(claims, torques, &told);
+}
+
+/// Currents whose gain the bodies do not tell, beside those `told`: it is the middle of the others where they are alike.
+fn others(claims: &mut [Claim], torques: &[usize], told: &[usize]) {
+    let Some(gain) = alike(told.iter().map(|&k| claims[k].scale)) else {
+        return;
+    };
+    for &k in torques {
+        let c = &mut claims[k];
+        let unit = c.unit.and_then(names::unit).map_or(1.0, |(_, f)| f);
+        if c.means != Means::Current || c.scale != unit || c.at.is_none() || told.contains(&k) {
+            continue;
+        }
+        c.scale = gain;
+        c.confidence = c.confidence.min(0.6);
+        c.evidence += OF_OTHERS;
     }
 }

@@ -62,7 +62,7 @@ fn look(
     };
     let n = plant.actuators().len();
     let shared = (0..plant.robot().bodies.len()).any(|b| plant.driver(b).is_none());
-    if shared || n == 0 || n > 8 || frame.time.is_none() {
+    if shared || n == 0 || n > 8 || frame.time.is_none() && frame.rate.is_none() {
         return;
     }
     let smooth = Smooth::new(frame, CUTOFF);
@@ -75,11 +75,8 @@ fn look(
         .collect();
     let torques: Vec<usize> = (0..claims.len())
         .filter(|&k| {
-            moving(k)
-                && matches!(
-                    claims[k].means,
-                    Means::Torque | Means::Current | Means::Other
-                )
+            let torque = matches!(claims[k].means, Means::Torque | Means::Current);
+            moving(k) && (torque || claims[k].free())
         })
         .collect();
     if positions.len() != n || torques.is_empty() {
@@ -223,7 +220,7 @@ fn look(
 /// Where no column is known to be a position: the `n` smoothest, if they stand apart from all others.
 fn smoothest(smooth: &Smooth, claims: &mut [Claim], n: usize, moving: &dyn Fn(usize) -> bool) {
     let free: Vec<usize> = (0..claims.len())
-        .filter(|&k| claims[k].means == Means::Other && moving(k))
+        .filter(|&k| claims[k].free() && moving(k))
         .collect();
     // the same position twice: the later one is measured
     let mut twins: Vec<(usize, usize, Fit)> = Vec::new();
@@ -248,13 +245,21 @@ fn smoothest(smooth: &Smooth, claims: &mut [Claim], n: usize, moving: &dyn Fn(us
         .filter(|k| !commands.iter().any(|(c, ..)| c == k))
         .collect();
     rest.sort_by(|a, b| smooth.rough[*a].total_cmp(&smooth.rough[*b]));
-    if rest.len() <= n || smooth.rough[rest[n]] < GAP * smooth.rough[rest[n - 1]] {
+    // where torques are named, what is left may be the positions alone
+    let torque = |c: &&Claim| matches!(c.means, Means::Torque | Means::Current);
+    let alone = rest.len() == n && claims.iter().filter(torque).count() == n;
+    let apart = rest.len() > n && smooth.rough[rest[n]] >= GAP * smooth.rough[rest[n - 1]];
+    if !alone && !apart {
         return;
     }
     for &k in &rest[..n] {
         claims[k].means = Means::Position;
         claims[k].confidence = 0.4;
-        claims[k].evidence = "it is smoother than all others, as positions are".into();
+        claims[k].evidence = match alone {
+            true => "it is one of the columns that are left beside the torques",
+            false => "it is smoother than all others, as positions are",
+        }
+        .into();
     }
     for (first, later, f) in commands {
         if rest[..n].contains(&later) {

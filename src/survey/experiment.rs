@@ -1,6 +1,7 @@
 //! The `experiment.toml` of a survey, with every decision in it.
 
 use super::claim::{Claim, Means};
+use super::families::OF_OTHERS;
 use super::frame::{Course, Frame};
 use super::{Survey, file_name};
 use crate::log::formats::detect;
@@ -173,9 +174,15 @@ fn record(
                 frame.time_unit
             );
         }
-        None => out.push_str(
-            "# time = { rate = 500.0 }   # TODO: samples a second; no column is a time\n",
-        ),
+        None => {
+            let _ = match frame.rate {
+                Some(rate) => writeln!(out, "time = {{ rate = {rate} }}   # by its velocities"),
+                None => writeln!(
+                    out,
+                    "# time = {{ rate = 500.0 }}   # TODO: samples a second; no column is a time"
+                ),
+            };
+        }
     }
     for (key, means) in [
         ("q", Means::Position),
@@ -280,12 +287,23 @@ fn group(out: &mut String, survey: &Survey, key: &str, means: Means) {
         parts.push(format!("without = [\"{what}\"]"));
     }
     let least = found.iter().map(|(_, c)| c.confidence).fold(1.0, f64::min);
+    let others: Vec<&str> = found
+        .iter()
+        .filter(|(_, c)| c.evidence.contains(OF_OTHERS))
+        .filter_map(|(_, c)| c.joint.as_deref())
+        .collect();
     let note = match means {
         Means::Current if !scaled => {
-            "   # TODO: currents: state scale = [N m at the joint for each A]"
+            "   # TODO: currents: state scale = [N m at the joint for each A]".into()
         }
-        Means::Current => "; gains by the nominal model: state those of the drives in scale",
-        _ => "",
+        Means::Current if others.is_empty() => {
+            "; gains by the nominal model: state those of the drives in scale".into()
+        }
+        Means::Current => format!(
+            "; gains by the nominal model, of {} the middle of the others: state those of the drives in scale",
+            others.join(", ")
+        ),
+        _ => String::new(),
     };
     let _ = match parts.is_empty() {
         true => writeln!(out, "{key} = {columns}   # confidence {least:.2}{note}"),

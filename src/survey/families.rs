@@ -132,8 +132,7 @@ pub(super) fn families(
                     (true, _) => "",
                     (_, true) =>
                         "; its unit is that of the other columns, by its size and the joint's limit",
-                    (_, false) =>
-                        "; its gain is the middle of the others: the bodies do not tell it",
+                    (_, false) => OF_OTHERS,
                 },
                 if made {
                     "; it has less noise than another: commanded, filtered or made by a model"
@@ -183,17 +182,24 @@ impl Gain {
                 0.8,
             ));
         }
-        let currents = || known.iter().filter(|g| !g.torque).map(|g| g.scale);
-        let middle = crate::median::median(currents());
-        let alike = currents().all(|g| (g / middle).ln().abs() < ALIKE.ln());
-        (torques == 0 && alike).then_some((
-            Gain {
-                torque: false,
-                scale: middle,
-            },
-            0.6,
-        ))
+        let middle = alike(known.iter().map(|g| g.scale)).filter(|_| torques == 0)?;
+        let gain = Gain {
+            torque: false,
+            scale: middle,
+        };
+        Some((gain, 0.6))
     }
+}
+
+/// What is said of a gain that is [`alike`] others.
+pub(super) const OF_OTHERS: &str =
+    "; its gain is the middle of the others: the bodies do not tell it";
+
+/// The middle of the gains of drives, where there are several and all are about the same.
+pub(super) fn alike(gains: impl Iterator<Item = f64> + Clone) -> Option<f64> {
+    let middle = crate::median::median(gains.clone());
+    let same = gains.clone().all(|g| (g / middle).ln().abs() < ALIKE.ln());
+    (same && gains.count() > 1).then_some(middle)
 }
 
 /// What a column is, without telling torques, currents and their commands apart.

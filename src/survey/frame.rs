@@ -29,8 +29,12 @@ pub struct Frame {
     pub rows: usize,
     /// names of the columns
     pub names: Vec<String>,
+    /// columns of texts that hold the same one throughout: their names, and what they hold
+    pub labels: Vec<[String; 2]>,
     /// number of the column of the time
     pub time: Option<usize>,
+    /// samples a second, where no column is a time and the velocities tell them
+    pub rate: Option<f64>,
     /// unit of the time
     pub time_unit: &'static str,
     /// step of the grid, s
@@ -96,15 +100,7 @@ impl Frame {
                     .unwrap_or(0.0);
                 (column.iter().map(|x| (x - origin) * factor).collect(), name)
             }
-            None => {
-                warnings.push(Warning::new(
-                    WarningKind::TimeRepaired,
-                    &subject,
-                    "no column is a time: its samples are counted, and all rates are for a step of one second; state \
-                     time = { rate = … }",
-                ));
-                ((0..rows).map(|i| i as f64).collect::<Vec<f64>>(), "none")
-            }
+            None => ((0..rows).map(|i| i as f64).collect::<Vec<f64>>(), "none"),
         };
         let clock = clock::repair(&raw, 0, &subject);
         warnings.extend(
@@ -140,6 +136,8 @@ impl Frame {
             };
             let wrong = match found {
                 Some((time, _)) if time == k => Vec::new(),
+                // another stamp, whatever its size
+                _ if counts_up(&y) => Vec::new(),
                 _ => impossible(&y),
             };
             if let Some(&at) = wrong.first() {
@@ -183,7 +181,9 @@ impl Frame {
             paths,
             rows,
             names: table.names,
+            labels: table.labels,
             time: found.map(|(k, _)| k),
+            rate: None,
             time_unit: time_name,
             step,
             columns,
@@ -195,6 +195,28 @@ impl Frame {
             silent,
             warnings,
         })
+    }
+
+    /// Counts time by so many samples a second, where no column is one.
+    pub(super) fn paced(&mut self, rate: Option<f64>) -> Option<Warning> {
+        if self.time.is_some() {
+            return None;
+        }
+        let message = match rate {
+            Some(rate) => {
+                self.rate = Some(rate);
+                self.step = 1.0 / rate;
+                format!(
+                    "no column is a time: with {rate} samples a second the velocities are the derivatives of the positions, \
+                     and so they were counted; state another time = {{ rate = … }} where it is wrong"
+                )
+            }
+            None => "no column is a time: its samples are counted, and all rates are for a step of one second; state \
+                     time = { rate = … }"
+                .into(),
+        };
+        let subject = self.paths.first().map_or(String::new(), |p| file_name(p));
+        Some(Warning::new(WarningKind::TimeRepaired, subject, message))
     }
 
     /// Length, s.
@@ -366,12 +388,24 @@ fn intervals(moving: &[bool], step: f64) -> Vec<[f64; 2]> {
     out
 }
 
-/// The column that is a time by its numbers: it increases by even steps.
+/// Whether a column never goes back, and on from nearly each row to the next.
+fn counts_up(y: &[f64]) -> bool {
+    let on = y.windows(2).filter(|w| w[1] > w[0]).count();
+    y.windows(2).all(|w| w[1] >= w[0]) && on as f64 > 0.97 * y.len() as f64
+}
+
+/// The column that is a time by its numbers: it increases by even steps. One with a name, which is none of a time, that counts
+/// by one says how many rows there are and not when they were taken.
 fn even(table: &Table) -> Option<usize> {
+    let header = table.names.iter().any(|n| n.parse::<f64>().is_err());
+    let counts = |y: &[f64]| {
+        let by_one = y.windows(2).filter(|w| w[1] - w[0] == 1.0).count();
+        header && by_one as f64 > 0.9 * y.len() as f64
+    };
     let mut best: Option<(usize, f64)> = None;
     for (k, y) in table.columns.iter().enumerate() {
         let n = y.len();
-        if n < 8 {
+        if n < 8 || counts(y) {
             continue;
         }
         let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();

@@ -7,6 +7,7 @@
 
 use super::claim::{Claim, Means};
 use super::frame::{Frame, richest};
+use super::units::{TURN, extent};
 use crate::error::{Warning, WarningKind};
 use crate::signals::Butterworth;
 use crate::signals::butterworth::first_derivative;
@@ -172,11 +173,51 @@ pub(super) fn examine(
     let smooth = Smooth::new(frame, 15.0);
     let moving = |k: usize| !smooth.value[k].is_empty() && Some(k) != frame.time;
     named_pairs(&smooth, claims, &moving, warnings);
+    positions_of_named(&smooth, claims, &moving);
     unnamed_pairs(&smooth, claims, &moving);
     commands(&smooth, claims, &moving);
     if !robot {
         number(claims);
     }
+}
+
+/// How far the samples a second of one joint may lie beside those of the others, and beside a whole number.
+const PACE: [f64; 2] = [0.02, 3e-3];
+/// Samples a second that a log has.
+const RATES: std::ops::RangeInclusive<f64> = 5.0..=2e4;
+
+/// Samples a second with which named velocities are the derivatives of named positions, where no column is a time.
+pub(super) fn rate(frames: &[Frame], claims: &[Claim]) -> Option<f64> {
+    let frame = richest(frames).filter(|f| f.time.is_none())?;
+    // degrees beside rad/s would tell another rate
+    let turns = |(k, c): (usize, &Claim)| {
+        let [low, high] = extent(frames, k).map(|x| x * c.scale);
+        c.means == Means::Position && low.abs().max(high.abs()) > TURN
+    };
+    if claims.iter().enumerate().any(turns) {
+        return None;
+    }
+    let smooth = Smooth::new(frame, 15.0);
+    let named = |means: Means| {
+        let all = claims.iter().enumerate();
+        all.filter(move |(_, c)| c.means == means && c.side != Some("link") && c.at.is_some())
+    };
+    let slopes: Vec<f64> = named(Means::Velocity)
+        .filter_map(|(v, c)| {
+            let (p, own) = named(Means::Position).find(|(_, o)| o.at == c.at)?;
+            let f = smooth.follows(&smooth.rate[p], &smooth.value[v])?;
+            let slope = f.slope * c.factor() / own.factor();
+            (f.share > SURE && slope > 0.0).then_some(slope)
+        })
+        .collect();
+    let middle = crate::median::median(slopes.iter().copied());
+    let close = |x: &f64| (x / middle - 1.0).abs() < PACE[0];
+    let agreed = slopes.len() > 1 && slopes.iter().all(close) && RATES.contains(&middle);
+    let whole = middle.round();
+    agreed.then_some(match (middle / whole - 1.0).abs() < PACE[1] {
+        true => whole,
+        false => middle,
+    })
 }
 
 /// Velocities, accelerations and commands whose names say to which positions they belong.
@@ -304,6 +345,68 @@ fn named_pairs(
     }
 }
 
+/// Positions without names, of velocities whose names say of which joint they are.
+fn positions_of_named(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -> bool) {
+    for v in 0..claims.len() {
+        let (Means::Velocity, Some(joint)) = (claims[v].means, claims[v].at) else {
+            continue;
+        };
+        let known = |c: &Claim| c.means == Means::Position && c.at == Some(joint);
+        if !moving(v) || claims.iter().any(known) {
+            continue;
+        }
+        let free = (0..claims.len()).filter(|&k| claims[k].free() && moving(k));
+        let mut fits: Vec<(usize, Fit)> = free
+            .filter_map(|p| Some((p, smooth.follows(&smooth.rate[p], &smooth.value[v])?)))
+            .filter(|(_, f)| f.share > SURE)
+            .collect();
+        fits.sort_by(|a, b| b.1.share.total_cmp(&a.1.share));
+        let Some(&(first, f)) = fits.first() else {
+            continue;
+        };
+        // a command is the same position once more, ahead of it or without its noise; anything else is a rival
+        let (mut own, mut other) = ((first, f), false);
+        for &(k, fit) in &fits[1..] {
+            let twin = smooth.follows(&smooth.value[own.0], &smooth.value[k]);
+            match twin.filter(|t| t.share > TWIN) {
+                Some(t) => {
+                    let later = t.delay > 0.5 * smooth.step;
+                    let level = t.delay.abs() <= 0.5 * smooth.step;
+                    if later || level && smooth.rough[k] > smooth.rough[own.0] {
+                        own = (k, fit);
+                    }
+                }
+                None => other |= !clearly(f.share, fit.share),
+            }
+        }
+        if other {
+            continue;
+        }
+        let (p, f) = own;
+        let factor = f.slope * claims[v].factor();
+        let exact = unit_factor(factor).map(|(exact, _)| exact);
+        let joint = claims[v].joint.clone();
+        let evidence = format!(
+            "{}, which is named, is {:.2} % its derivative",
+            claims[v].column,
+            100.0 * f.share
+        );
+        claims[v].of = Some(p);
+        claims[v].delay = delay(&f, smooth.step);
+        let at = claims[v].at;
+        let c = &mut claims[p];
+        (c.means, c.at, c.joint) = (Means::Position, at, joint);
+        (c.sign, c.scale) = (factor.signum(), exact.unwrap_or(factor.abs()));
+        c.confidence = if exact.is_some() { 0.9 } else { 0.6 };
+        c.evidence = evidence;
+    }
+}
+
+/// Whether a share explained is beyond that of a rival.
+fn clearly(share: f64, rival: f64) -> bool {
+    share - rival >= 0.25 * (1.0 - share).max(1e-4)
+}
+
 /// A delay that is told from none: more than a quarter of a step, and not beyond the lags that were tried.
 fn delay(f: &Fit, step: f64) -> f64 {
     match f.delay.abs() > 0.25 * step && !f.at_end {
@@ -321,7 +424,7 @@ fn ahead(f: &Fit) -> String {
 /// Positions and velocities that have no names: pairs that are best for each other.
 fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -> bool) {
     let free: Vec<usize> = (0..claims.len())
-        .filter(|&k| claims[k].means == Means::Other && moving(k))
+        .filter(|&k| claims[k].free() && moving(k))
         .collect();
     let positions: Vec<usize> = (0..claims.len())
         .filter(|&k| claims[k].means == Means::Position && moving(k))
@@ -355,7 +458,7 @@ fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -
             .filter(|(a, b, _)| *b == v && *a != p)
             .map(|(_, _, f)| f.share)
             .fold(0.0, f64::max);
-        if f.share - rival < 0.25 * (1.0 - f.share).max(1e-4) {
+        if !clearly(f.share, rival) {
             continue;
         }
         used.push(v);
@@ -414,7 +517,7 @@ fn commands(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -> boo
         .filter(|&k| claims[k].means == Means::Position && moving(k))
         .collect();
     let free: Vec<usize> = (0..claims.len())
-        .filter(|&k| claims[k].means == Means::Other && moving(k))
+        .filter(|&k| claims[k].free() && moving(k))
         .collect();
     for k in free {
         let best = positions

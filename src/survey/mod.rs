@@ -72,6 +72,7 @@ pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
         };
         parts.push((path.clone(), formats::read(path, &request)?));
     }
+    merge::call_by_files(&mut parts);
     let topic = parts.iter().find_map(|(_, r)| r.topic.clone());
     let same = parts
         .windows(2)
@@ -94,6 +95,8 @@ pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
         warnings.append(&mut f.warnings);
     }
     let mut claims = stated::claims(&frames, format, robot, &mut warnings);
+    let rate = kinematics::rate(&frames, &claims);
+    warnings.extend(frames.iter_mut().filter_map(|f| f.paced(rate)));
     for (k, claim) in claims.iter_mut().enumerate() {
         if !frames.is_empty() && frames.iter().all(|f| f.silent.contains(&k)) {
             claim.abstain("it holds no number at all: the channel was not recorded");

@@ -4,7 +4,7 @@ use super::claim::{Claim, Means};
 use super::frame::Frame;
 use crate::error::{Warning, WarningKind, counted, listed};
 use crate::log::formats::Format;
-use crate::log::names::{self, Quantity, named};
+use crate::log::names::{self, Quantity};
 use crate::plant::Plant;
 
 /// How far a name is believed that nothing confirms.
@@ -26,7 +26,7 @@ pub(super) fn claims(
         Format::Csv | Format::Npz | Format::Mat => NAMED,
         _ => DOCUMENTED,
     };
-    let mut all: Vec<Option<names::Named>> = frame.names.iter().map(|n| named(n, format)).collect();
+    let mut all = names::all(&frame.names, &frame.labels, format);
     untell_repeated(frame, &mut all, warnings);
     let mut out: Vec<Claim> = frame.names.iter().map(|n| Claim::none(n)).collect();
     if let Some(k) = frame.time {
@@ -169,7 +169,9 @@ fn joints_of(
         .filter_map(|(i, &k)| Some((of(k)?.number?, i)))
         .collect();
     numbers.sort_unstable();
-    let distinct = numbers.windows(2).all(|w| w[0].0 < w[1].0) && numbers.len() == columns.len();
+    // what has no number beside as many as there are joints is something else
+    let whole = numbers.len() == columns.len() || numbers.len() == own.len();
+    let distinct = numbers.windows(2).all(|w| w[0].0 < w[1].0) && whole;
     if !distinct && columns.len() > 1 {
         return out;
     }

@@ -13,7 +13,7 @@ const CLEAR: f64 = 6.0;
 /// … for what is stated to be contradicted.
 const CONTRADICTS: f64 = 60.0;
 /// … and what is then left of some column, in what the statement leaves.
-const MATERIAL: f64 = 0.5;
+pub(super) const MATERIAL: f64 = 0.5;
 /// Least share of a torque column that its joint explains.
 pub(super) const SHARE: f64 = 0.5;
 

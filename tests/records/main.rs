@@ -5,6 +5,7 @@ mod common;
 
 mod blind;
 mod formats;
+mod layouts;
 mod log;
 mod signals;
 mod simulate;

@@ -199,15 +199,23 @@ fn a_channel_without_numbers_is_not_recognised() {
     );
 }
 
-/// A name that stands in the header twice says what its columns are, not of which joint.
+/// A name that stands in the header twice says what its columns are, not of which joint; velocities that are named do.
 #[test]
 fn names_that_stand_twice_tell_no_joint() {
     let dir = tempfile::tempdir().unwrap();
-    let rows = |t| [q(t), dq(t)].concat();
-    let path = table(dir.path(), "run.csv", "t,q1,q1,dq1,dq2", rows);
-    let found = survey(&[path], None).unwrap();
-    for name in ["q1", "q1#2"] {
-        let c = found.claims.iter().find(|c| c.column == name).unwrap();
+    let named = |head: &str, rows: &dyn Fn(f64) -> Vec<f64>| {
+        let path = table(dir.path(), "run.csv", head, rows);
+        let found = survey(&[path], None).unwrap();
+        let claims = ["q1", "q1#2"].map(|name| {
+            let mut all = found.claims.iter();
+            all.find(|c| c.column == name).unwrap().clone()
+        });
+        (claims, found)
+    };
+    let (claims, _) = named("t,q1,q1,dq1,dq2", &|t| [q(t), dq(t)].concat());
+    assert_eq!(claims.map(|c| c.at), [Some(0), Some(1)]);
+    let (claims, found) = named("t,q1,q1", &|t| q(t).to_vec());
+    for c in claims {
         assert!(c.at.is_none() && c.confidence < 0.5, "{c:?}");
     }
     let said = |w: &excite::Warning| w.subject == "q1" && w.message.contains("2 columns");

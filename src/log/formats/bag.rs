@@ -324,8 +324,8 @@ impl<'a> Collector<'a> {
         let mut table = Table {
             names: vec!["t".into()],
             columns: vec![if set { layout.stamps } else { layout.received }],
-            before: 0,
             warnings,
+            ..Table::default()
         };
         table.names.extend(layout.names);
         table.columns.extend(layout.columns);

@@ -294,13 +294,18 @@ pub(super) fn first_rows(table: &mut Table, rows: usize) -> Table {
                 std::mem::replace(c, rest)
             })
             .collect(),
+        labels: table.labels.clone(),
         before,
         warnings: Vec::new(),
     }
 }
 
-/// A column of texts can be neither a time nor a measurement.
+/// A column of texts can be neither a time nor a measurement; one that holds the same text throughout is a label.
 fn without_texts(table: &mut Table, dialect: &Dialect) {
+    let labels = dialect.names.iter().zip(&dialect.texts);
+    table.labels = labels
+        .filter_map(|(name, text)| Some([name.clone(), text.clone()?]))
+        .collect();
     let texts: Vec<usize> = (0..table.names.len())
         .filter(|&k| dialect.cells[k] == Cell::Text)
         .collect();

@@ -34,6 +34,8 @@ pub(crate) struct Dialect {
     pub names: Vec<String>,
     /// what the columns hold
     pub cells: Vec<Cell>,
+    /// the text that a column of texts holds in all lines that were looked at
+    pub texts: Vec<Option<String>>,
     /// lines before the first of numbers
     pub head: usize,
     /// a line that looks like names and was not used, because it has so many for other columns
@@ -251,6 +253,14 @@ impl Dialect {
                 _ => Cell::Text,
             });
         }
+        let same = |k: usize| {
+            let mut all = rows.iter().map(|r| text(&r.1[k]));
+            let one = all.next().filter(|t| !t.is_empty())?;
+            all.all(|t| t == one).then_some(one)
+        };
+        let texts = (0..n)
+            .map(|k| same(k).filter(|_| kinds[k] == Cell::Text))
+            .collect();
         let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
         let full: usize = rows.iter().map(|r| numbers(&r.1)).sum();
         let cells_seen: usize = split
@@ -284,11 +294,18 @@ impl Dialect {
                 plain,
                 names,
                 cells: kinds,
+                texts,
                 head: first,
                 unused,
             },
         ))
     }
+}
+
+/// The text of a cell, without quotes.
+fn text(cell: &[u8]) -> String {
+    let text = String::from_utf8_lossy(cell);
+    text.trim().trim_matches(['"', '\'']).trim().to_string()
 }
 
 /// Names of columns.
@@ -311,10 +328,6 @@ fn names(
     delimiter: u8,
     open: bool,
 ) -> Names {
-    let text = |c: &[u8]| {
-        let t = String::from_utf8_lossy(c);
-        t.trim().trim_matches(['"', '\'']).trim().to_string()
-    };
     let numbered = |unused: Option<String>| Names {
         names: (1..=n).map(|k| k.to_string()).collect(),
         named: false,

@@ -1,0 +1,319 @@
+//! Layouts of tables as recorders and people write them, of a robot whose columns are known.
+
+use super::blind::simulated;
+use excite::Plant;
+use excite::survey::{Means, Survey, survey};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+const JOINTS: usize = 6;
+
+/// Time, positions, velocities and torques of an arm.
+struct Motion {
+    plant: Plant,
+    t: Vec<f64>,
+    q: Vec<Vec<f64>>,
+    dq: Vec<Vec<f64>>,
+    tau: Vec<Vec<f64>>,
+}
+
+impl Motion {
+    fn new() -> Self {
+        let plant = Plant::load("ur5e").unwrap();
+        let all = simulated(&plant, 11);
+        let of = |means: Means| -> Vec<Vec<f64>> {
+            let mine = all.iter().filter(|c| c.means == means);
+            mine.map(|c| c.values.clone()).collect()
+        };
+        let mut t = of(Means::Time);
+        let [q, dq, tau] = [Means::Position, Means::Velocity, Means::Torque].map(of);
+        Motion {
+            t: t.remove(0),
+            plant,
+            q,
+            dq,
+            tau,
+        }
+    }
+
+    /// A table of these columns, cell by cell.
+    fn write(&self, path: &Path, head: &str, cells: &dyn Fn(usize) -> Vec<String>) {
+        let mut text = format!("{head}\n");
+        for i in 0..self.t.len() {
+            let _ = writeln!(text, "{}", cells(i).join(","));
+        }
+        std::fs::write(path, text).unwrap();
+    }
+
+    fn joint(&self, j: usize) -> String {
+        self.plant.actuators()[j].name.clone()
+    }
+}
+
+/// `name0,name1,…`
+fn numbered(name: &str, from: usize) -> String {
+    let all = (from..from + JOINTS).map(|j| format!("{name}{j}"));
+    all.collect::<Vec<_>>().join(",")
+}
+
+fn numbers(columns: &[Vec<f64>], i: usize) -> impl Iterator<Item = String> + '_ {
+    columns.iter().map(move |c| c[i].to_string())
+}
+
+/// Names of the columns that are claimed to mean this, joint by joint.
+fn claimed(found: &Survey, means: Means) -> Vec<String> {
+    (0..JOINTS)
+        .map(|j| {
+            let name = &found.joints[j];
+            let mine = |c: &&excite::survey::Claim| {
+                c.means == means && c.joint.as_ref() == Some(name) && c.confidence >= 0.5
+            };
+            let mut all = found.claims.iter().filter(mine);
+            let first = all.next().map_or("none".into(), |c| c.column.clone());
+            assert!(all.next().is_none(), "two {means:?} of {name}");
+            first
+        })
+        .collect()
+}
+
+fn expect(found: &Survey, means: Means, of: &dyn Fn(usize) -> String) {
+    let expected: Vec<String> = (0..JOINTS).map(of).collect();
+    assert_eq!(claimed(found, means), expected);
+}
+
+fn of(path: &Path, plant: &Plant) -> Survey {
+    survey(&[path.to_path_buf()], Some(plant)).unwrap()
+}
+
+/// `rostopic echo -p` writes joints in the order of their names, and the names in columns of texts; a Python script may
+/// write lists of both.
+#[test]
+fn names_of_joints_in_columns_of_texts_count() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let order = [2, 1, 0, 3, 4, 5];
+    let permuted =
+        |c: &[Vec<f64>]| -> Vec<Vec<f64>> { order.iter().map(|&j| c[j].clone()).collect() };
+    let [q, dq, tau] = [&m.q, &m.dq, &m.tau].map(|c| permuted(c));
+    let names: Vec<String> = order.iter().map(|&j| m.joint(j)).collect();
+    let place = |j: usize| order.iter().position(|&o| o == j).unwrap();
+    // cells of lists are called by numbers from 0, too
+    for (head, lists) in [
+        (
+            format!(
+                "%time,field.header.seq,field.header.stamp,field.header.frame_id,{}",
+                ["name", "position", "velocity", "effort"]
+                    .map(|what| numbered(&format!("field.{what}"), 0))
+                    .join(",")
+            ),
+            false,
+        ),
+        ("timestamp,name,position,velocity,effort".into(), true),
+    ] {
+        let path = folder.path().join("echo.csv");
+        m.write(&path, &head, &|i| {
+            let stamp = 1_600_000_000_000_000_000_i64 + (m.t[i] * 1e9) as i64;
+            if !lists {
+                let mut out = vec![
+                    stamp.to_string(),
+                    (1000 + i).to_string(),
+                    (stamp - 3000).to_string(),
+                    String::new(),
+                ];
+                out.extend(names.clone());
+                for c in [&q, &dq, &tau] {
+                    out.extend(numbers(c, i));
+                }
+                return out;
+            }
+            let list = |all: Vec<String>| format!("\"[{}]\"", all.join(" "));
+            let mut out = vec![stamp.to_string(), list(names.clone())];
+            out.extend([&q, &dq, &tau].map(|c| list(numbers(c, i).collect())));
+            out
+        });
+        let found = of(&path, &m.plant);
+        for (means, what) in [
+            (Means::Position, "position"),
+            (Means::Velocity, "velocity"),
+            (Means::Torque, "effort"),
+        ] {
+            expect(&found, means, &|j| match lists {
+                true => format!("{what}[{}]", place(j)),
+                false => format!("field.{what}{}", place(j)),
+            });
+        }
+        let said: Vec<&str> = found.warnings.iter().map(|w| &w.message[..]).collect();
+        assert!(
+            said.iter()
+                .all(|m| !m.contains("cannot have been measured")),
+            "{said:?}"
+        );
+    }
+}
+
+/// Without the names, arrays in another order are not given to joints by their numbers: neither the positions that the
+/// torques contradict, nor what belongs to them.
+#[test]
+fn arrays_in_another_order_are_not_claimed() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arrays.csv");
+    let head = [
+        "t".into(),
+        numbered("position_", 0),
+        numbered("velocity_", 0),
+    ];
+    let head = format!("{},{}", head.join(","), numbered("effort_", 0));
+    let order = [2, 1, 0, 3, 4, 5];
+    m.write(&path, &head, &|i| {
+        let mut out = vec![m.t[i].to_string()];
+        for c in [&m.q, &m.dq, &m.tau] {
+            out.extend(order.iter().map(|&j| c[j][i].to_string()));
+        }
+        out
+    });
+    let found = of(&path, &m.plant);
+    for (means, what) in [
+        (Means::Position, "position"),
+        (Means::Velocity, "velocity"),
+        (Means::Torque, "effort"),
+    ] {
+        let claims = claimed(&found, means);
+        for j in [0, 2] {
+            let wrong = format!("{what}_{j}");
+            assert_ne!(claims[j], wrong, "{claims:?}");
+        }
+        assert_eq!(claims[3], format!("{what}_3"));
+    }
+    assert!(found.warnings.iter().any(|w| w.message.contains("swapped")));
+}
+
+/// Positions without a name that says so, beside velocities or torques that have one; units in brackets; a clock of whole
+/// seconds; what belongs to the tool.
+#[test]
+fn positions_are_found_beside_what_is_named() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let degrees: Vec<Vec<f64>> =
+        m.q.iter()
+            .map(|c| c.iter().map(|x| x.to_degrees()).collect())
+            .collect();
+    // of velocities
+    let path = folder.path().join("state.csv");
+    let head = format!(
+        "frame,timestamp,{},{}",
+        numbered("observation.state", 0),
+        numbered("observation.velocity", 0)
+    );
+    m.write(&path, &head, &|i| {
+        let mut out = vec![i.to_string(), m.t[i].to_string()];
+        out.extend(numbers(&degrees, i).chain(numbers(&m.dq, i)));
+        out
+    });
+    let found = of(&path, &m.plant);
+    expect(&found, Means::Position, &|j| {
+        format!("observation.state{j}")
+    });
+    let scale = |c: &excite::survey::Claim| (c.scale.to_degrees() - 1.0).abs() < 1e-9;
+    let positions = found.claims.iter().filter(|c| c.means == Means::Position);
+    assert!(positions.clone().all(scale) && positions.count() == JOINTS);
+    // of torques
+    for (what, torque) in [("J", "Torque_J"), ("AXIS_ACT.A", "TORQUE_AXIS_ACT.A")] {
+        let path = folder.path().join("torques.csv");
+        let head = format!("Time,{},{}", numbered(what, 1), numbered(torque, 1));
+        m.write(&path, &head, &|i| {
+            let mut out = vec![m.t[i].to_string()];
+            out.extend(numbers(&degrees, i).chain(numbers(&m.tau, i)));
+            out
+        });
+        let found = of(&path, &m.plant);
+        expect(&found, Means::Position, &|j| format!("{what}{}", j + 1));
+        expect(&found, Means::Torque, &|j| format!("{torque}{}", j + 1));
+    }
+    // by their units, on a clock of whole seconds
+    let path = folder.path().join("units.csv");
+    let bracket = |name: &str, unit: &str| {
+        let all = (1..=JOINTS).map(|j| format!("{name}{j} [{unit}]"));
+        all.collect::<Vec<_>>().join(",")
+    };
+    let head = format!(
+        "pc_ts,speed_scaling,{},{},tcp_0",
+        bracket("A", "deg"),
+        bracket("A", "Nm")
+    );
+    m.write(&path, &head, &|i| {
+        let mut out = vec![(1_759_936_358 + m.t[i] as i64).to_string(), "1".to_string()];
+        out.extend(numbers(&degrees, i).chain(numbers(&m.tau, i)));
+        out.push(m.q[0][i].cos().to_string());
+        out
+    });
+    let found = of(&path, &m.plant);
+    expect(&found, Means::Position, &|j| format!("A{} [deg]", j + 1));
+    expect(&found, Means::Torque, &|j| format!("A{} [Nm]", j + 1));
+    let tool = found.claims.iter().find(|c| c.column == "tcp_0").unwrap();
+    assert_eq!(tool.means, Means::Other);
+    let frame = &found.frames[0];
+    assert!((frame.step - 0.004).abs() < 1e-5, "{}", frame.step);
+}
+
+/// Files that are called by what they hold, with the names of the joints, and no time: the velocities tell it.
+#[test]
+fn files_of_a_quantity_each_are_one_record() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let head: Vec<String> = (0..JOINTS).map(|j| m.joint(j)).collect();
+    let files: Vec<PathBuf> = [("q", &m.q), ("dq", &m.dq), ("current_mA", &m.tau)]
+        .map(|(name, columns)| {
+            let path = folder.path().join(format!("{name}.csv"));
+            m.write(&path, &head.join(","), &|i| {
+                let milli = if name == "current_mA" { 100.0 } else { 1.0 };
+                let all = columns.iter().map(|c| (milli * c[i]).to_string());
+                all.collect()
+            });
+            path
+        })
+        .into();
+    let found = survey(&files, Some(&m.plant)).unwrap();
+    assert_eq!(found.frames.len(), 1);
+    assert_eq!(found.frames[0].rate, Some(250.0));
+    expect(&found, Means::Position, &|j| format!("q.{}", m.joint(j)));
+    expect(&found, Means::Current, &|j| {
+        format!("current_mA.{}", m.joint(j))
+    });
+    // 10 N m/A, also of a wrist whose friction hides its bodies
+    for c in found.claims.iter().filter(|c| c.means == Means::Current) {
+        let gain = 1e3 * c.scale;
+        assert!((gain / 10.0).ln().abs() < 0.5, "{}: {gain}", c.column);
+    }
+    // and the experiment that is written is read, with this rate
+    let toml = folder.path().join("experiment.toml");
+    let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
+    std::fs::write(&toml, &text).unwrap();
+    let read = excite::log::Experiment::read(&toml).unwrap();
+    assert!((read.records[0].step - 0.004).abs() < 1e-9, "{text}");
+    for (a, b) in read.records[0].q[0].iter().zip(&m.q[0]) {
+        assert_eq!(a, b);
+    }
+}
+
+/// A column that counts rows is no time.
+#[test]
+fn a_counter_is_no_time() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("steps.csv");
+    let head = format!(
+        "step,{},{}",
+        numbered("dof_pos_", 0),
+        numbered("dof_tau_", 0)
+    );
+    m.write(&path, &head, &|i| {
+        let mut out = vec![i.to_string()];
+        out.extend(numbers(&m.q, i).chain(numbers(&m.tau, i)));
+        out
+    });
+    let found = of(&path, &m.plant);
+    assert_eq!(found.frames[0].time, None);
+    let mut said = found.warnings.iter().map(|w| &w.message);
+    assert!(said.any(|m| m.contains("no column is a time")));
+}
