@@ -5,7 +5,7 @@
 
 use super::catalogue::{Context, Effect};
 use super::data::Data;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Projected};
 use super::search::{Candidate, singles};
 use super::settle::settled;
 use super::thresholds::THRESHOLDS as T;
@@ -73,9 +73,16 @@ impl<'a> Searched<'a> {
         self.decision.members.iter().filter(late).count()
     }
 
-    /// `χ²` with the set that was found.
+    /// The effects that it claims.
+    fn claimed(&self) -> impl Iterator<Item = &Member> {
+        let members = self.decision.members.iter();
+        members.filter(|m| m.together >= T.confidence.claim)
+    }
+
+    /// `χ²` with them: what else was tried and not claimed takes a little, too.
     fn left(&self) -> f64 {
-        self.evidence.j0 - self.evidence.fit(&self.decision.projected()).gain
+        let members: Vec<&Projected> = self.claimed().map(|m| &m.candidate.projected).collect();
+        self.evidence.j0 - self.evidence.fit(&members).gain
     }
 
     /// By how much another `χ²` may be higher and count as no worse: deviations squared of what the set leaves.

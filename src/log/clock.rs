@@ -107,8 +107,8 @@ fn looked_through(raw: &[f64], before: usize, subject: &str) -> Clock {
     if !usual.is_finite() {
         return Clock::default();
     }
-    let same = steps().filter(|d| *d == 0.0).count();
-    let coarse = same as f64 > 0.1 * raw.len() as f64;
+    let same = same(raw);
+    let coarse = coarse(raw);
     let mut scan = Scan::new(raw, before, usual, coarse);
     for i in 0..raw.len() {
         scan.take(i);
@@ -159,6 +159,16 @@ fn looked_through(raw: &[f64], before: usize, subject: &str) -> Clock {
         gaps,
         warnings,
     }
+}
+
+/// How many stamps equal the one before.
+fn same(t: &[f64]) -> usize {
+    t.windows(2).filter(|w| w[1] == w[0]).count()
+}
+
+/// Whether so many are equal that the clock is coarser than the sampling.
+pub(super) fn coarse(t: &[f64]) -> bool {
+    same(t) as f64 > 0.1 * t.len() as f64
 }
 
 /// Stamps of a coarse clock at even distances: where it goes on for the first and for the last time it is right; in which

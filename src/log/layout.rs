@@ -120,15 +120,10 @@ impl Layout {
         let n = joints.len();
         let own: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
         let all = names::all(&table.names, &table.labels, format);
-        let mut out = Layout::default();
-        let time = all
-            .iter()
-            .position(|c| c.as_ref().is_some_and(|c| c.quantity == Quantity::Time));
-        if let Some(k) = time {
-            let unit = all[k].as_ref().and_then(|c| c.unit);
-            let factor = unit.and_then(names::unit).map(|(_, f)| f);
-            out.time = Some(Time::Column(Place::Number(k + 1), factor));
-        }
+        let mut out = Layout {
+            time: Self::time_of(table, format),
+            ..Layout::default()
+        };
         for quantity in [
             Quantity::Position,
             Quantity::Velocity,

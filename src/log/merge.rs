@@ -1,20 +1,24 @@
 //! Files that hold a quantity each as one table, on the stamps of the first.
 
-use super::Table;
 use super::formats::{Format, Read};
 use super::layout::{Layout, Time, time_unit};
 use super::names::{self, Quantity};
 use super::resample::{Order, interpolate};
+use super::{Table, clock};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 
 impl Layout {
-    /// The time by the names of the columns.
+    /// The time by the names of the columns: of several the first that goes on from row to row, as a clock of whole seconds does
+    /// not.
     pub(crate) fn time_of(table: &Table, format: Format) -> Option<Time> {
-        let (k, named) = table.names.iter().enumerate().find_map(|(k, name)| {
+        let named = table.names.iter().enumerate().filter_map(|(k, name)| {
             let named = names::named(name, format)?;
             (named.quantity == Quantity::Time).then_some((k, named))
-        })?;
+        });
+        let mut named: Vec<(usize, names::Named)> = named.collect();
+        named.sort_by_key(|(k, _)| clock::coarse(&table.columns[*k]));
+        let (k, named) = named.into_iter().next()?;
         let factor = named.unit.and_then(names::unit).map(|(_, f)| f);
         Some(Time::Column(super::place::Place::Number(k + 1), factor))
     }

@@ -143,9 +143,13 @@ fn foreign(word: &str) -> bool {
     other || elsewhere(word)
 }
 
-/// Whether a name is that of no quantity of a joint, whatever its numbers look like.
+/// Whether a name is that of no quantity of a joint as measured, whatever its numbers look like: of something else, or of a
+/// command that is no position.
 pub(crate) fn of_no_joint(name: &str) -> bool {
-    words(name).iter().any(|w| elsewhere(w))
+    let words = words(name);
+    let commanded = || words.iter().any(|w| commands(w));
+    let other = || named(name, Format::Csv).is_some_and(|n| n.quantity == Quantity::Other);
+    words.iter().any(|w| elsewhere(w)) || commanded() && other()
 }
 
 /// Words that say nothing of which joint it is.
@@ -373,11 +377,11 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
     plain(what, joint, number, unit_of(name, what, format))
 }
 
-/// What a name says that is no more than the number of a joint, as `A1 [deg]`: its unit tells. `AXIS_ACT.A1` is what KUKA calls
+/// What a name says that is no more than the number of a joint, as `A1 [deg]` or `i1_mA`: its unit tells. `AXIS_ACT.A1` is what KUKA calls
 /// a position.
 fn by_unit(name: &str, words: &[String]) -> Option<Named> {
     let number = number(words)?;
-    let unit = in_brackets(name);
+    let unit = in_brackets(name).or_else(|| at_end(name));
     let quantity = match unit {
         _ if words.windows(2).any(|w| w[0] == "axis" && w[1] == "act") => Quantity::Position,
         Some("rad" | "deg" | "rev") => Quantity::Position,
@@ -388,7 +392,10 @@ fn by_unit(name: &str, words: &[String]) -> Option<Named> {
         _ => return None,
     };
     let before = name.split(['[', '(']).next().unwrap_or(name);
-    let plain = |w: &String| idle(w) || w.parse::<usize>().is_ok();
+    let current = quantity == Quantity::Current;
+    let plain = |w: &String| {
+        idle(w) || w.parse::<usize>().is_ok() || current && matches!(w.as_str(), "i" | "iq")
+    };
     self::words(before).iter().all(plain).then_some(Named {
         quantity,
         joint: None,
@@ -413,6 +420,22 @@ fn joint_part(name: &str) -> String {
 fn in_brackets(name: &str) -> Option<&'static str> {
     let (_, rest) = name.rsplit_once(['[', '('])?;
     unit(rest.trim_end_matches([']', ')'])).map(|(u, _)| u)
+}
+
+/// The unit that is the last word of a name, of those that mean nothing else.
+fn at_end(name: &str) -> Option<&'static str> {
+    match name.rsplit_once('_')?.1.to_lowercase().as_str() {
+        "rad" => Some("rad"),
+        "deg" => Some("deg"),
+        "nm" => Some("N m"),
+        "ma" => Some("mA"),
+        _ => None,
+    }
+}
+
+/// Whether a name has a unit of time in brackets.
+pub(crate) fn in_unit_of_time(name: &str) -> bool {
+    matches!(in_brackets(name), Some("s" | "ms" | "us" | "ns" | "min"))
 }
 
 /// The unit that stands in a name, in brackets or at its end; of Kortex degrees.

@@ -37,7 +37,7 @@ pub struct Claim {
     /// the column of positions whose derivative or command it is
     #[serde(skip)]
     pub of: Option<usize>,
-    /// whether its name is that of something else than a joint has
+    /// whether its name is that of something else than a joint has, or of a command that is no position
     #[serde(skip)]
     pub of_no_joint: bool,
     /// name of the joint

@@ -51,7 +51,8 @@ fn settled(problem: &Problem, stated: &Hypothesis, best: &Hypothesis, plant: &Pl
     out
 }
 
-/// Compares what is stated with what the torques say; contradictions are warnings with the evidence.
+/// Compares what is stated with what the torques say; contradictions are warnings with the evidence. Returns whether there
+/// is none.
 #[allow(clippy::too_many_arguments)]
 pub(super) fn contradict(
     problem: &Problem,
@@ -63,7 +64,7 @@ pub(super) fn contradict(
     torques: &[usize],
     plant: &Plant,
     warnings: &mut Vec<Warning>,
-) {
+) -> bool {
     let joints = plant.actuators();
     let n = joints.len();
     let best = &settled(problem, stated, best, plant);
@@ -159,6 +160,7 @@ pub(super) fn contradict(
         }
     }
     others(claims, torques, &told);
+    !differs
 }
 
 /// Currents whose gain the bodies do not tell, beside those `told`: it is the middle of the others where they are alike.

@@ -8,7 +8,7 @@ use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
 use super::search::{Hypothesis, Problem, Signals};
 use super::units::{extent, fits};
-use super::verdict::{Verdict, explained, orientation};
+use super::verdict::{Orientation, Verdict, explained, orientation};
 use crate::dynamics::Workspace;
 use crate::error::{Warning, WarningKind};
 use crate::plant::Plant;
@@ -153,7 +153,9 @@ fn look(
         return;
     }
     // torques that come later than the positions
-    let late: Vec<f64> = match stated_all {
+    let named = |k: &usize| matches!(claims[*k].means, Means::Torque | Means::Current);
+    let named = torques.iter().any(named);
+    let late: Vec<f64> = match stated_all && named {
         true => vec![0.0; torques.len()],
         false => delays(&problem, best, &smooth, &torques, &samples),
     };
@@ -173,13 +175,29 @@ fn look(
     let rival = |h: &Hypothesis| allowed(h) && (!limited || slow(h));
     let verdict = Verdict::of(&problem, best, &found, &rival, n);
     let trusted = stated_all && claims.iter().any(|c| c.evidence.contains("its name"));
+    let mut ws = Workspace::default();
     if trusted {
-        contradict(
+        let holds = contradict(
             &problem, &stated, best, &verdict, claims, &positions, &torques, plant, warnings,
         );
+        // columns of torques without names beside positions that have them
+        if holds && !named {
+            let usual: Vec<Orientation> = verdict.sign.iter().map(Orientation::stated).collect();
+            families(
+                &smooth,
+                claims,
+                &problem.matches(&stated, &mut ws),
+                &torques,
+                plant,
+                &stated,
+                &usual,
+                &verdict,
+                &late,
+            );
+            blocks(claims, plant);
+        }
         return;
     }
-    let mut ws = Workspace::default();
     let matches = problem.matches(best, &mut ws);
     let usual = orientation(best, &verdict, &matches, claims, &positions, &torques);
     for j in 0..n {

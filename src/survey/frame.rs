@@ -8,6 +8,7 @@ use crate::log::channels;
 use crate::log::clock;
 use crate::log::formats::Format;
 use crate::log::layout::{Layout, Time, time_unit};
+use crate::log::names;
 use crate::log::place::Place;
 use crate::log::record::{impossible, too_few, unmeasured};
 use crate::log::resample::{Order, fill, interpolate};
@@ -224,6 +225,15 @@ impl Frame {
         self.step * self.len().saturating_sub(1) as f64
     }
 
+    /// What the time is in, in words.
+    pub(super) fn clock(&self) -> String {
+        match (self.time, self.rate) {
+            (Some(_), _) => format!("time in {}", self.time_unit),
+            (None, Some(_)) => "no time, counted by the velocities".into(),
+            (None, None) => "no time".into(),
+        }
+    }
+
     /// How many rows a second there are, in words: by the usual step, and in the mean where that is another.
     pub(super) fn pace(&self) -> String {
         let usual = 1.0 / self.step;
@@ -398,14 +408,14 @@ fn counts_up(y: &[f64]) -> bool {
 /// by one says how many rows there are and not when they were taken.
 fn even(table: &Table) -> Option<usize> {
     let header = table.names.iter().any(|n| n.parse::<f64>().is_err());
-    let counts = |y: &[f64]| {
+    let counts = |name: &str, y: &[f64]| {
         let by_one = y.windows(2).filter(|w| w[1] - w[0] == 1.0).count();
-        header && by_one as f64 > 0.9 * y.len() as f64
+        header && by_one as f64 > 0.9 * y.len() as f64 && !names::in_unit_of_time(name)
     };
     let mut best: Option<(usize, f64)> = None;
     for (k, y) in table.columns.iter().enumerate() {
         let n = y.len();
-        if n < 8 || counts(y) {
+        if n < 8 || counts(&table.names[k], y) {
             continue;
         }
         let steps: Vec<f64> = y.windows(2).map(|w| w[1] - w[0]).collect();

@@ -129,7 +129,7 @@ fn record(survey: &Survey, frame: &Frame, courses: &[Course]) -> Section {
     }
     let body = html! {
         p { (frame.rows) " rows, " (significant(frame.duration(), 4)) " s at " (frame.pace())
-            ", time in " (frame.time_unit) "; " (counted(frame.gaps.len(), "gap"))
+            ", " (frame.clock()) "; " (counted(frame.gaps.len(), "gap"))
             @if let Some(longest) = frame.gaps.iter().map(|g| g[1] - g[0]).max_by(f64::total_cmp) {
                 ", the longest " (significant(longest, 3)) " s"
             } "." }

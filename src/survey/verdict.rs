@@ -188,6 +188,18 @@ pub(super) struct Orientation {
     pub confidence: f64,
 }
 
+impl Orientation {
+    /// That of a column which is named; `told`: the torques tell it as well.
+    pub fn stated(told: &bool) -> Self {
+        Orientation {
+            known: true,
+            told: *told,
+            sign: 1.0,
+            confidence: 0.9,
+        }
+    }
+}
+
 /// The sign of each joint: by the model, or, where turning the positions and the torques together changes nothing that is
 /// seen, the one with which fewer columns are turned. Joints that only turn together, as those of an arm and its mirror
 /// image, are turned together.

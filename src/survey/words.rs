@@ -18,12 +18,12 @@ pub fn summary(survey: &Survey, files: &[PathBuf]) -> String {
         let names: Vec<String> = f.paths.iter().map(|p| file_name(p)).collect();
         let _ = writeln!(
             out,
-            "{}: {} rows, {:.2} s at {} (time in {}), {}",
+            "{}: {} rows, {:.2} s at {} ({}), {}",
             names.join(" + "),
             f.rows,
             f.duration(),
             f.pace(),
-            f.time_unit,
+            f.clock(),
             counted(f.gaps.len(), "gap")
         );
         for (name, c) in survey.joints.iter().zip(courses) {

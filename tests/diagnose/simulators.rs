@@ -144,13 +144,14 @@ fn every_effect_in_mujoco_swinging() {
 
 /// A delay and the time by which MuJoCo's dry friction reverses early are nearly the same: beside a large drag the records
 /// settled at 11.5 ms and a delay of 2.3 ms, which the arm does not have. Beside a cable, with friction that is not that of the
-/// robot file, they did at 11.2 ms and a delay of 1.3 ms.
+/// robot file, they did at 11.2 ms and a delay of 1.3 ms. Beside a delay of one joint, or cogging, no time was found at all, and
+/// the other joints had delays of minus 8 to 12 ms.
 #[test]
 fn early_friction_of_mujoco_beside_a_large_effect_is_no_delay() {
     let Some(python) = python::with("mujoco, numpy") else {
         return;
     };
-    for (seed, arm) in [("2", "13"), ("4", "24")] {
+    for (seed, arm) in [("2", "13"), ("4", "24"), ("5", "20"), ("5", "21")] {
         let folder = tempfile::tempdir().unwrap();
         let out = Command::new(&python)
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mujoco_arms.py"))

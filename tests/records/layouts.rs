@@ -256,6 +256,46 @@ fn positions_are_found_beside_what_is_named() {
     assert!((frame.step - 0.004).abs() < 1e-5, "{}", frame.step);
 }
 
+/// Torques without a name that says so, beside positions that have one, in an order of their own; currents by their unit.
+#[test]
+fn torques_are_found_beside_positions() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("torques.csv");
+    let order = [2, 1, 0, 3, 4, 5];
+    let beside = |name: &str| {
+        let head = format!("t,{},{}", numbered("q", 1), numbered(name, 0));
+        m.write(&path, &head, &|i| {
+            let mut out = vec![m.t[i].to_string()];
+            out.extend(numbers(&m.q, i));
+            out.extend(order.iter().map(|&j| m.tau[j][i].to_string()));
+            out
+        });
+        of(&path, &m.plant)
+    };
+    // a command is no torque that was measured
+    let commanded = beside("TargetMoment");
+    assert_eq!(claimed(&commanded, Means::Torque), ["none"; JOINTS]);
+    let found = beside("x");
+    expect(&found, Means::Position, &|j| format!("q{}", j + 1));
+    let torques = claimed(&found, Means::Torque);
+    for (j, name) in torques.iter().enumerate() {
+        let right = format!("x{}", order.iter().position(|&o| o == j).unwrap());
+        assert!(*name == right || j > 3 && name == "none", "{torques:?}");
+    }
+    let milli = (1..=JOINTS).map(|j| format!("i{j}_mA"));
+    let milli: Vec<String> = milli.collect();
+    let head = format!("t,{},{}", numbered("q", 1), milli.join(","));
+    m.write(&path, &head, &|i| {
+        let mut out = vec![m.t[i].to_string()];
+        out.extend(numbers(&m.q, i));
+        out.extend(m.tau.iter().map(|c| (100.0 * c[i]).to_string()));
+        out
+    });
+    let found = of(&path, &m.plant);
+    expect(&found, Means::Current, &|j| milli[j].clone());
+}
+
 /// Files that are called by what they hold, with the names of the joints, and no time: the velocities tell it.
 #[test]
 fn files_of_a_quantity_each_are_one_record() {
@@ -316,4 +356,22 @@ fn a_counter_is_no_time() {
     assert_eq!(found.frames[0].time, None);
     let mut said = found.warnings.iter().map(|w| &w.message);
     assert!(said.any(|m| m.contains("no column is a time")));
+    // but one in a unit of time is, and of two clocks the one that goes on from row to row
+    let time = |head: &str, first: &dyn Fn(usize) -> Vec<String>| {
+        let head = format!("{head},{}", numbered("q", 1));
+        m.write(&path, &head, &|i| {
+            let mut out = first(i);
+            out.extend(numbers(&m.q, i));
+            out
+        });
+        let frame = of(&path, &m.plant).frames.remove(0);
+        let name = frame.time.map(|k| frame.names[k].clone());
+        (name.unwrap(), frame.time_unit)
+    };
+    let zeit = time("Zeit [ms]", &|i| vec![i.to_string()]);
+    assert_eq!(zeit, ("Zeit [ms]".into(), "ms"));
+    let of_two = time("pc_ts,timestamp", &|i| {
+        vec![(m.t[i] as i64).to_string(), m.t[i].to_string()]
+    });
+    assert_eq!(of_two, ("timestamp".into(), "s"));
 }
