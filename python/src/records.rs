@@ -111,8 +111,7 @@ impl Experiment {
                 table: Table {
                     names: r.names,
                     columns: r.columns.iter().map(|c| c.as_array().to_vec()).collect(),
-                    before: 0,
-                    warnings: Vec::new(),
+                    ..Table::default()
                 },
                 name: r.name,
                 purpose: purpose(r.holdout),
