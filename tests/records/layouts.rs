@@ -8,6 +8,13 @@ use std::path::{Path, PathBuf};
 
 const JOINTS: usize = 6;
 
+/// What the arrays of a message are called.
+const ARRAYS: [(Means, &str); 3] = [
+    (Means::Position, "position"),
+    (Means::Velocity, "velocity"),
+    (Means::Torque, "effort"),
+];
+
 /// Time, positions, velocities and torques of an arm.
 struct Motion {
     plant: Plant,
@@ -132,11 +139,7 @@ fn names_of_joints_in_columns_of_texts_count() {
             out
         });
         let found = of(&path, &m.plant);
-        for (means, what) in [
-            (Means::Position, "position"),
-            (Means::Velocity, "velocity"),
-            (Means::Torque, "effort"),
-        ] {
+        for (means, what) in ARRAYS {
             expect(&found, means, &|j| match lists {
                 true => format!("{what}[{}]", place(j)),
                 false => format!("field.{what}{}", place(j)),
@@ -173,11 +176,7 @@ fn arrays_in_another_order_are_not_claimed() {
         out
     });
     let found = of(&path, &m.plant);
-    for (means, what) in [
-        (Means::Position, "position"),
-        (Means::Velocity, "velocity"),
-        (Means::Torque, "effort"),
-    ] {
+    for (means, what) in ARRAYS {
         let claims = claimed(&found, means);
         for j in [0, 2] {
             let wrong = format!("{what}_{j}");
