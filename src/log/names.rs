@@ -214,7 +214,8 @@ pub(crate) fn repeated(all: &[String]) -> Vec<&str> {
 fn time(name: &str) -> Option<Option<&'static str>> {
     // of a path or of a field of a structure, its last part
     let last = name.rsplit(['.', '/']).next().unwrap_or(name);
-    let words = words(if last.is_empty() { name } else { last });
+    let whole = last.is_empty() || matches!(last, "sec" | "secs");
+    let words = words(if whole { name } else { last });
     let known = |w: &str| {
         matches!(
             w,

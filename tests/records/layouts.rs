@@ -154,6 +154,40 @@ fn names_of_joints_in_columns_of_texts_count() {
     }
 }
 
+/// `ros2 topic echo --csv` writes no header, and stamps in two columns; the joints as the driver has them.
+#[test]
+fn a_joint_state_without_a_header_is_read() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("echo.csv");
+    let order = [2, 1, 0, 3, 4, 5];
+    for frame in ["", "base_link"] {
+        m.write(&path, "", &|i| {
+            let t = 1_700_000_000.3 + m.t[i];
+            let nanoseconds = ((t - t.floor()) * 1e9).round();
+            let mut out = vec![t.floor().to_string(), nanoseconds.to_string(), frame.into()];
+            out.extend(order.iter().map(|&j| m.joint(j)));
+            for c in [&m.q, &m.dq, &m.tau] {
+                out.extend(order.iter().map(|&j| c[j][i].to_string()));
+            }
+            out
+        });
+        let found = of(&path, &m.plant);
+        let place = |j: usize| order.iter().position(|&o| o == j).unwrap();
+        for (means, what) in ARRAYS {
+            expect(&found, means, &|j| format!("{what}[{}]", place(j)));
+        }
+        assert!((found.frames[0].step - 0.004).abs() < 1e-8);
+        // the experiment reads what was found
+        let toml = folder.path().join("experiment.toml");
+        let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
+        std::fs::write(&toml, &text).unwrap();
+        let read = excite::log::Experiment::read(&toml).unwrap();
+        assert!((read.records[0].step - 0.004).abs() < 1e-8, "{text}");
+        assert_eq!(read.records[0].q[0][9], m.q[0][9]);
+    }
+}
+
 /// Without the names, arrays in another order are not given to joints by their numbers: neither the positions that the
 /// torques contradict, nor what belongs to them.
 #[test]

@@ -116,9 +116,14 @@ pub(crate) fn read_parts<T>(
                 text = at.map_or(&[], |at| &text[at + 1..]);
             }
             line = dialect.head;
-            let keep: Vec<bool> = (0..dialect.names.len())
+            let mut keep: Vec<bool> = (0..dialect.names.len())
                 .map(|k| dialect.cells[k] != Cell::Text && wanted(&dialect.names[k]))
                 .collect();
+            // whoever wants the seconds of a stamp wants all of it; seconds alone are too coarse to pass rows over by
+            if let Some([seconds, more]) = stamp_in_two(&dialect.names) {
+                keep[more] |= keep[seconds];
+                skip = None;
+            }
             let lines = (size as usize / first.unwrap_or(80).max(8)).min(1 << 24);
             table.names = dialect.names.clone();
             table.columns = vec![Vec::new(); table.names.len()];
@@ -168,6 +173,7 @@ pub(crate) fn read_parts<T>(
             };
             let mut part = first_rows(&mut table, count);
             without_texts(&mut part, dialect);
+            whole_stamp(&mut part);
             given += count;
             if each(part)?.is_break() {
                 table.columns.iter_mut().for_each(Vec::clear);
@@ -224,6 +230,7 @@ pub(crate) fn read_parts<T>(
         )
     }));
     without_texts(&mut table, &dialect);
+    whole_stamp(&mut table);
     Ok((table, checked))
 }
 
@@ -297,6 +304,31 @@ pub(super) fn first_rows(table: &mut Table, rows: usize) -> Table {
         labels: table.labels.clone(),
         before,
         warnings: Vec::new(),
+    }
+}
+
+/// Columns of the seconds and of the nanoseconds of a stamp.
+fn stamp_in_two(names: &[String]) -> Option<[usize; 2]> {
+    let of = |name: &str, ends: &[&str]| {
+        let name = name.to_lowercase();
+        let (stem, end) = name.rsplit_once(['.', '_']).unwrap_or(("", &name));
+        ends.contains(&end).then(|| stem.to_string())
+    };
+    (1..names.len()).find_map(|k| {
+        let seconds = of(&names[k - 1], &["sec", "secs"])?;
+        let more = of(&names[k], &["nanosec", "nanosecs", "nsec", "nsecs"])?;
+        (seconds == more).then_some([k - 1, k])
+    })
+}
+
+/// Makes the seconds of a stamp in two columns the whole stamp.
+fn whole_stamp(table: &mut Table) {
+    let Some([seconds, more]) = stamp_in_two(&table.names) else {
+        return;
+    };
+    let (before, after) = table.columns.split_at_mut(more);
+    for (s, ns) in before[seconds].iter_mut().zip(&after[0]) {
+        *s += 1e-9 * ns;
     }
 }
 

@@ -258,7 +258,7 @@ impl Dialect {
             let one = all.next().filter(|t| !t.is_empty())?;
             all.all(|t| t == one).then_some(one)
         };
-        let texts = (0..n)
+        let texts: Vec<Option<String>> = (0..n)
             .map(|k| same(k).filter(|_| kinds[k] == Cell::Text))
             .collect();
         let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
@@ -272,10 +272,22 @@ impl Dialect {
             * (1.0 - 0.5 / n as f64);
         let open = kinds.last() == Some(&Cell::Empty);
         let Names {
-            names,
+            mut names,
             named,
             unused,
         } = names(lines, &split, first, n, delimiter, open);
+        if !named {
+            let stamp = |r: &&&(usize, Vec<Vec<u8>>)| {
+                let below = |c: &Vec<u8>, most: f64| {
+                    number::parse(c).is_some_and(|x| x >= 0.0 && x < most && x.fract() == 0.0)
+                };
+                below(&r.1[0], 1e10) && n > 1 && below(&r.1[1], 1e9)
+            };
+            let stamped = rows.iter().filter(stamp).count() == rows.len();
+            if let Some(echoed) = echoed(&kinds, &texts).filter(|_| stamped) {
+                names = echoed;
+            }
+        }
         // what stands behind a delimiter at the end of each line
         if let Some(last) = kinds.last_mut().filter(|_| open && named)
             && names.last() == Some(&n.to_string())
@@ -300,6 +312,27 @@ impl Dialect {
             },
         ))
     }
+}
+
+/// Names of the columns that `ros2 topic echo --csv` writes of a `JointState`, without a header: stamp in seconds and nanoseconds,
+/// frame, and the lists of names, positions, velocities and efforts. `None` for anything else.
+fn echoed(kinds: &[Cell], texts: &[Option<String>]) -> Option<Vec<String>> {
+    const FIRST: usize = 3;
+    let head = kinds.get(..FIRST)?;
+    let joints: Vec<&String> = texts[FIRST..].iter().map_while(Option::as_ref).collect();
+    let n = joints.len();
+    let rest = &kinds[FIRST + n..];
+    let sound = head[..2] == [Cell::Number; 2] && matches!(head[2], Cell::Text | Cell::Empty);
+    let distinct = (1..n).all(|k| !joints[..k].contains(&joints[k]));
+    let numbers = rest.iter().all(|k| matches!(k, Cell::Number | Cell::Empty));
+    if n == 0 || !sound || !distinct || !numbers || rest.len() != n && rest.len() != 3 * n {
+        return None;
+    }
+    let lists = ["name", "position", "velocity", "effort"];
+    let of = |list: &'static str| (0..n).map(move |k| format!("{list}[{k}]"));
+    let head = ["stamp.sec", "stamp.nanosec", "frame_id"].map(|name| format!("header.{name}"));
+    let lists = lists.into_iter().take(1 + rest.len() / n).flat_map(of);
+    Some(head.into_iter().chain(lists).collect())
 }
 
 /// The text of a cell, without quotes.
