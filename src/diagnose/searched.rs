@@ -68,9 +68,8 @@ impl<'a> Searched<'a> {
 
     /// How many effects it claims that dry friction that reverses early may pass for.
     fn late(&self, effects: &[Box<dyn Effect>]) -> usize {
-        let late =
-            |m: &&Member| m.together >= T.confidence.claim && effects[m.candidate.effect].late();
-        self.decision.members.iter().filter(late).count()
+        let late = |m: &&Member| effects[m.candidate.effect].late();
+        self.claimed().filter(late).count()
     }
 
     /// The effects that it claims.

@@ -162,7 +162,7 @@ fn looked_through(raw: &[f64], before: usize, subject: &str) -> Clock {
 }
 
 /// How many stamps equal the one before.
-fn same(t: &[f64]) -> usize {
+pub(super) fn same(t: &[f64]) -> usize {
     t.windows(2).filter(|w| w[1] == w[0]).count()
 }
 

@@ -3,11 +3,11 @@
 
 mod entry;
 
-use super::Table;
 use super::formats::Format;
 use super::names::{self, Quantity};
 use super::place::Place;
 use super::resample::{Order, interpolate};
+use super::{Table, clock};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Joint;
 use std::path::Path;
@@ -88,13 +88,8 @@ pub(crate) fn time_unit(t: &[f64]) -> (f64, &'static str) {
     );
     let first = crate::median::median(t.iter().copied().filter(|x| x.abs() < 1e21));
     // rows that a coarse clock gives one stamp lie closer
-    let [on, same] = t.windows(2).fold([0usize; 2], |[on, same], w| {
-        [
-            on + usize::from(w[1] > w[0]),
-            same + usize::from(w[1] == w[0]),
-        ]
-    });
-    let each = 1.0 + same as f64 / on.max(1) as f64;
+    let on = t.windows(2).filter(|w| w[1] > w[0]).count();
+    let each = 1.0 + clock::same(t) as f64 / on.max(1) as f64;
     // the time since 1970, between 2001 and 2100
     for (factor, name) in [(1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns")] {
         let since = first * factor;

@@ -16,9 +16,7 @@ impl Layout {
             let named = names::named(name, format)?;
             (named.quantity == Quantity::Time).then_some((k, named))
         });
-        let mut named: Vec<(usize, names::Named)> = named.collect();
-        named.sort_by_key(|(k, _)| clock::coarse(&table.columns[*k]));
-        let (k, named) = named.into_iter().next()?;
+        let (k, named) = named.min_by_key(|(k, _)| clock::coarse(&table.columns[*k]))?;
         let factor = named.unit.and_then(names::unit).map(|(_, f)| f);
         Some(Time::Column(super::place::Place::Number(k + 1), factor))
     }

@@ -216,7 +216,7 @@ fn time(name: &str) -> Option<Option<&'static str>> {
     let last = name.rsplit(['.', '/']).next().unwrap_or(name);
     let whole = last.is_empty() || matches!(last, "sec" | "secs");
     let words = words(if whole { name } else { last });
-    let known = |w: &str| {
+    let clock = |w: &str| {
         matches!(
             w,
             "t" | "time"
@@ -226,13 +226,22 @@ fn time(name: &str) -> Option<Option<&'static str>> {
                 | "stamp"
                 | "clock"
                 | "elapsed"
-                | "header"
+                | "duration"
+                | "date"
+                | "datetime"
+        )
+    };
+    let beside = |w: &str| {
+        matches!(
+            w,
+            "header"
                 | "pc"
                 | "host"
                 | "ros"
                 | "robot"
                 | "epoch"
                 | "utc"
+                | "unix"
                 | "s"
                 | "sec"
                 | "secs"
@@ -242,27 +251,9 @@ fn time(name: &str) -> Option<Option<&'static str>> {
                 | "ns"
                 | "msec"
                 | "usec"
-                | "duration"
-                | "unix"
-                | "date"
-                | "datetime"
         )
     };
-    let time = words.iter().any(|w| {
-        matches!(
-            w.as_str(),
-            "t" | "time"
-                | "ts"
-                | "timestamp"
-                | "timestamps"
-                | "stamp"
-                | "clock"
-                | "elapsed"
-                | "duration"
-                | "date"
-                | "datetime"
-        )
-    });
+    let time = words.iter().any(|w| clock(w));
     let unit = words.iter().find_map(|w| match w.as_str() {
         "ms" | "msec" => Some("ms"),
         "us" | "usec" => Some("us"),
@@ -270,7 +261,7 @@ fn time(name: &str) -> Option<Option<&'static str>> {
         "s" | "sec" | "secs" | "seconds" => Some("s"),
         _ => None,
     });
-    (time && words.iter().all(|w| known(w))).then_some(unit)
+    (time && words.iter().all(|w| clock(w) || beside(w))).then_some(unit)
 }
 
 /// What the names of all columns say. Where columns of texts, the `labels`, hold the names of joints, as `name0` beside

@@ -6,7 +6,7 @@ use super::delay::{at_times, delays};
 use super::families::{blocks, families};
 use super::frame::{Frame, richest};
 use super::kinematics::{Fit, Smooth, inherit, unit_factor};
-use super::search::{Hypothesis, Problem, Signals};
+use super::search::{Hypothesis, Match, Problem, Signals};
 use super::units::{extent, fits};
 use super::verdict::{Orientation, Verdict, explained, orientation};
 use crate::dynamics::Workspace;
@@ -176,6 +176,14 @@ fn look(
     let verdict = Verdict::of(&problem, best, &found, &rival, n);
     let trusted = stated_all && claims.iter().any(|c| c.evidence.contains("its name"));
     let mut ws = Workspace::default();
+    // columns of torques, once the positions have their joints
+    let torques_too =
+        |claims: &mut [Claim], of: &Hypothesis, matches: &[Vec<Match>], usual: &[Orientation]| {
+            families(
+                &smooth, claims, matches, &torques, plant, of, usual, &verdict, &late,
+            );
+            blocks(claims, plant);
+        };
     if trusted {
         let holds = contradict(
             &problem, &stated, best, &verdict, claims, &positions, &torques, plant, warnings,
@@ -183,18 +191,8 @@ fn look(
         // columns of torques without names beside positions that have them
         if holds && !named {
             let usual: Vec<Orientation> = verdict.sign.iter().map(Orientation::stated).collect();
-            families(
-                &smooth,
-                claims,
-                &problem.matches(&stated, &mut ws),
-                &torques,
-                plant,
-                &stated,
-                &usual,
-                &verdict,
-                &late,
-            );
-            blocks(claims, plant);
+            let matches = problem.matches(&stated, &mut ws);
+            torques_too(claims, &stated, &matches, &usual);
         }
         return;
     }
@@ -229,10 +227,7 @@ fn look(
             });
     }
     followers(claims, &positions);
-    families(
-        &smooth, claims, &matches, &torques, plant, best, &usual, &verdict, &late,
-    );
-    blocks(claims, plant);
+    torques_too(claims, best, &matches, &usual);
 }
 
 /// Where no column is known to be a position: the `n` smoothest, if they stand apart from all others.

@@ -67,6 +67,24 @@ fn numbers(columns: &[Vec<f64>], i: usize) -> impl Iterator<Item = String> + '_ 
     columns.iter().map(move |c| c[i].to_string())
 }
 
+/// Row `i` of a table: what comes first, and then columns.
+fn row(mut first: Vec<String>, i: usize, columns: &[&[Vec<f64>]]) -> Vec<String> {
+    first.extend(columns.iter().flat_map(|c| numbers(c, i)));
+    first
+}
+
+/// Joints in the order of their names.
+const ORDER: [usize; JOINTS] = [2, 1, 0, 3, 4, 5];
+
+fn permuted(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    ORDER.iter().map(|&j| columns[j].clone()).collect()
+}
+
+/// Where a joint stands in that order.
+fn place(j: usize) -> usize {
+    ORDER.iter().position(|&o| o == j).unwrap()
+}
+
 /// Names of the columns that are claimed to mean this, joint by joint.
 fn claimed(found: &Survey, means: Means) -> Vec<String> {
     (0..JOINTS)
@@ -98,12 +116,8 @@ fn of(path: &Path, plant: &Plant) -> Survey {
 fn names_of_joints_in_columns_of_texts_count() {
     let m = Motion::new();
     let folder = tempfile::tempdir().unwrap();
-    let order = [2, 1, 0, 3, 4, 5];
-    let permuted =
-        |c: &[Vec<f64>]| -> Vec<Vec<f64>> { order.iter().map(|&j| c[j].clone()).collect() };
     let [q, dq, tau] = [&m.q, &m.dq, &m.tau].map(|c| permuted(c));
-    let names: Vec<String> = order.iter().map(|&j| m.joint(j)).collect();
-    let place = |j: usize| order.iter().position(|&o| o == j).unwrap();
+    let names: Vec<String> = ORDER.iter().map(|&j| m.joint(j)).collect();
     // cells of lists are called by numbers from 0, too
     for (head, lists) in [
         (
@@ -128,10 +142,7 @@ fn names_of_joints_in_columns_of_texts_count() {
                     String::new(),
                 ];
                 out.extend(names.clone());
-                for c in [&q, &dq, &tau] {
-                    out.extend(numbers(c, i));
-                }
-                return out;
+                return row(out, i, &[&q, &dq, &tau]);
             }
             let list = |all: Vec<String>| format!("\"[{}]\"", all.join(" "));
             let mut out = vec![stamp.to_string(), list(names.clone())];
@@ -160,20 +171,16 @@ fn a_joint_state_without_a_header_is_read() {
     let m = Motion::new();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("echo.csv");
-    let order = [2, 1, 0, 3, 4, 5];
+    let [q, dq, tau] = [&m.q, &m.dq, &m.tau].map(|c| permuted(c));
     for frame in ["", "base_link"] {
         m.write(&path, "", &|i| {
             let t = 1_700_000_000.3 + m.t[i];
             let nanoseconds = ((t - t.floor()) * 1e9).round();
             let mut out = vec![t.floor().to_string(), nanoseconds.to_string(), frame.into()];
-            out.extend(order.iter().map(|&j| m.joint(j)));
-            for c in [&m.q, &m.dq, &m.tau] {
-                out.extend(order.iter().map(|&j| c[j][i].to_string()));
-            }
-            out
+            out.extend(ORDER.iter().map(|&j| m.joint(j)));
+            row(out, i, &[&q, &dq, &tau])
         });
         let found = of(&path, &m.plant);
-        let place = |j: usize| order.iter().position(|&o| o == j).unwrap();
         for (means, what) in ARRAYS {
             expect(&found, means, &|j| format!("{what}[{}]", place(j)));
         }
@@ -201,13 +208,9 @@ fn arrays_in_another_order_are_not_claimed() {
         numbered("velocity_", 0),
     ];
     let head = format!("{},{}", head.join(","), numbered("effort_", 0));
-    let order = [2, 1, 0, 3, 4, 5];
+    let [q, dq, tau] = [&m.q, &m.dq, &m.tau].map(|c| permuted(c));
     m.write(&path, &head, &|i| {
-        let mut out = vec![m.t[i].to_string()];
-        for c in [&m.q, &m.dq, &m.tau] {
-            out.extend(order.iter().map(|&j| c[j][i].to_string()));
-        }
-        out
+        row(vec![m.t[i].to_string()], i, &[&q, &dq, &tau])
     });
     let found = of(&path, &m.plant);
     for (means, what) in ARRAYS {
@@ -239,9 +242,8 @@ fn positions_are_found_beside_what_is_named() {
         numbered("observation.velocity", 0)
     );
     m.write(&path, &head, &|i| {
-        let mut out = vec![i.to_string(), m.t[i].to_string()];
-        out.extend(numbers(&degrees, i).chain(numbers(&m.dq, i)));
-        out
+        let first = vec![i.to_string(), m.t[i].to_string()];
+        row(first, i, &[&degrees, &m.dq])
     });
     let found = of(&path, &m.plant);
     expect(&found, Means::Position, &|j| {
@@ -255,9 +257,7 @@ fn positions_are_found_beside_what_is_named() {
         let path = folder.path().join("torques.csv");
         let head = format!("Time,{},{}", numbered(what, 1), numbered(torque, 1));
         m.write(&path, &head, &|i| {
-            let mut out = vec![m.t[i].to_string()];
-            out.extend(numbers(&degrees, i).chain(numbers(&m.tau, i)));
-            out
+            row(vec![m.t[i].to_string()], i, &[&degrees, &m.tau])
         });
         let found = of(&path, &m.plant);
         expect(&found, Means::Position, &|j| format!("{what}{}", j + 1));
@@ -275,8 +275,8 @@ fn positions_are_found_beside_what_is_named() {
         bracket("A", "Nm")
     );
     m.write(&path, &head, &|i| {
-        let mut out = vec![(1_759_936_358 + m.t[i] as i64).to_string(), "1".to_string()];
-        out.extend(numbers(&degrees, i).chain(numbers(&m.tau, i)));
+        let first = vec![(1_759_936_358 + m.t[i] as i64).to_string(), "1".to_string()];
+        let mut out = row(first, i, &[&degrees, &m.tau]);
         out.push(m.q[0][i].cos().to_string());
         out
     });
@@ -295,14 +295,11 @@ fn torques_are_found_beside_positions() {
     let m = Motion::new();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("torques.csv");
-    let order = [2, 1, 0, 3, 4, 5];
+    let tau = permuted(&m.tau);
     let beside = |name: &str| {
         let head = format!("t,{},{}", numbered("q", 1), numbered(name, 0));
         m.write(&path, &head, &|i| {
-            let mut out = vec![m.t[i].to_string()];
-            out.extend(numbers(&m.q, i));
-            out.extend(order.iter().map(|&j| m.tau[j][i].to_string()));
-            out
+            row(vec![m.t[i].to_string()], i, &[&m.q, &tau])
         });
         of(&path, &m.plant)
     };
@@ -313,15 +310,14 @@ fn torques_are_found_beside_positions() {
     expect(&found, Means::Position, &|j| format!("q{}", j + 1));
     let torques = claimed(&found, Means::Torque);
     for (j, name) in torques.iter().enumerate() {
-        let right = format!("x{}", order.iter().position(|&o| o == j).unwrap());
+        let right = format!("x{}", place(j));
         assert!(*name == right || j > 3 && name == "none", "{torques:?}");
     }
     let milli = (1..=JOINTS).map(|j| format!("i{j}_mA"));
     let milli: Vec<String> = milli.collect();
     let head = format!("t,{},{}", numbered("q", 1), milli.join(","));
     m.write(&path, &head, &|i| {
-        let mut out = vec![m.t[i].to_string()];
-        out.extend(numbers(&m.q, i));
+        let mut out = row(vec![m.t[i].to_string()], i, &[&m.q]);
         out.extend(m.tau.iter().map(|c| (100.0 * c[i]).to_string()));
         out
     });
@@ -381,9 +377,7 @@ fn a_counter_is_no_time() {
         numbered("dof_tau_", 0)
     );
     m.write(&path, &head, &|i| {
-        let mut out = vec![i.to_string()];
-        out.extend(numbers(&m.q, i).chain(numbers(&m.tau, i)));
-        out
+        row(vec![i.to_string()], i, &[&m.q, &m.tau])
     });
     let found = of(&path, &m.plant);
     assert_eq!(found.frames[0].time, None);
@@ -392,11 +386,7 @@ fn a_counter_is_no_time() {
     // but one in a unit of time is, and of two clocks the one that goes on from row to row
     let time = |head: &str, first: &dyn Fn(usize) -> Vec<String>| {
         let head = format!("{head},{}", numbered("q", 1));
-        m.write(&path, &head, &|i| {
-            let mut out = first(i);
-            out.extend(numbers(&m.q, i));
-            out
-        });
+        m.write(&path, &head, &|i| row(first(i), i, &[&m.q]));
         let frame = of(&path, &m.plant).frames.remove(0);
         let name = frame.time.map(|k| frame.names[k].clone());
         (name.unwrap(), frame.time_unit)

@@ -172,8 +172,7 @@ pub(crate) fn read_parts<T>(
                 break;
             };
             let mut part = first_rows(&mut table, count);
-            without_texts(&mut part, dialect);
-            whole_stamp(&mut part);
+            finish(&mut part, dialect);
             given += count;
             if each(part)?.is_break() {
                 table.columns.iter_mut().for_each(Vec::clear);
@@ -229,8 +228,7 @@ pub(crate) fn read_parts<T>(
             format!("its header has {what}: it was not used, and the columns are called by their numbers"),
         )
     }));
-    without_texts(&mut table, &dialect);
-    whole_stamp(&mut table);
+    finish(&mut table, &dialect);
     Ok((table, checked))
 }
 
@@ -319,6 +317,12 @@ fn stamp_in_two(names: &[String]) -> Option<[usize; 2]> {
         let more = of(&names[k], &["nanosec", "nanosecs", "nsec", "nsecs"])?;
         (seconds == more).then_some([k - 1, k])
     })
+}
+
+/// Makes of the rows that were read what is handed on.
+fn finish(table: &mut Table, dialect: &Dialect) {
+    without_texts(table, dialect);
+    whole_stamp(table);
 }
 
 /// Makes the seconds of a stamp in two columns the whole stamp.

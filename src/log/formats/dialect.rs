@@ -253,14 +253,15 @@ impl Dialect {
                 _ => Cell::Text,
             });
         }
-        let same = |k: usize| {
+        let same = |(k, kind): (usize, &Cell)| {
+            if *kind != Cell::Text {
+                return None;
+            }
             let mut all = rows.iter().map(|r| text(&r.1[k]));
             let one = all.next().filter(|t| !t.is_empty())?;
             all.all(|t| t == one).then_some(one)
         };
-        let texts: Vec<Option<String>> = (0..n)
-            .map(|k| same(k).filter(|_| kinds[k] == Cell::Text))
-            .collect();
+        let texts: Vec<Option<String>> = kinds.iter().enumerate().map(same).collect();
         let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
         let full: usize = rows.iter().map(|r| numbers(&r.1)).sum();
         let cells_seen: usize = split
@@ -276,17 +277,11 @@ impl Dialect {
             named,
             unused,
         } = names(lines, &split, first, n, delimiter, open);
-        if !named {
-            let stamp = |r: &&&(usize, Vec<Vec<u8>>)| {
-                let below = |c: &Vec<u8>, most: f64| {
-                    number::parse(c).is_some_and(|x| x >= 0.0 && x < most && x.fract() == 0.0)
-                };
-                below(&r.1[0], 1e10) && n > 1 && below(&r.1[1], 1e9)
-            };
-            let stamped = rows.iter().filter(stamp).count() == rows.len();
-            if let Some(echoed) = echoed(&kinds, &texts).filter(|_| stamped) {
-                names = echoed;
-            }
+        if !named
+            && let Some(echoed) = echoed(&kinds, &texts)
+            && rows.iter().all(|r| stamped(&r.1))
+        {
+            names = echoed;
         }
         // what stands behind a delimiter at the end of each line
         if let Some(last) = kinds.last_mut().filter(|_| open && named)
@@ -333,6 +328,14 @@ fn echoed(kinds: &[Cell], texts: &[Option<String>]) -> Option<Vec<String>> {
     let head = ["stamp.sec", "stamp.nanosec", "frame_id"].map(|name| format!("header.{name}"));
     let lists = lists.into_iter().take(1 + rest.len() / n).flat_map(of);
     Some(head.into_iter().chain(lists).collect())
+}
+
+/// Whether a row begins with a stamp in seconds and nanoseconds.
+fn stamped(row: &[Vec<u8>]) -> bool {
+    let below = |(cell, most): (&Vec<u8>, f64)| {
+        number::parse(cell).is_some_and(|x| x >= 0.0 && x < most && x.fract() == 0.0)
+    };
+    row.len() > 1 && row.iter().zip([1e10, 1e9]).all(below)
 }
 
 /// The text of a cell, without quotes.
