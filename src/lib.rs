@@ -87,6 +87,7 @@ mod dot;
 pub mod dynamics;
 mod error;
 pub mod export;
+mod extremes;
 #[doc(hidden)]
 pub mod heap;
 pub mod identifiability;

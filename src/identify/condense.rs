@@ -88,6 +88,7 @@ pub(super) fn of_records(
     let all = Equations::new(plant, base, &settings.signals, records)?;
     warnings.extend(all.prepared.iter().flat_map(|p| p.warnings.clone()));
     let (mut a, mut folds) = part(&[], FOLDS);
+    let mut together = None;
     if all.records.iter().any(|r| r.purpose == Purpose::Fit) {
         let mut fit = all.fit()?;
         warnings.extend(fit.unit_suspicions());
@@ -99,10 +100,11 @@ pub(super) fn of_records(
         let Solved {
             part,
             folds: of_folds,
+            together: of_all,
             rows,
             estimate,
         } = solved;
-        (a, folds) = (part, of_folds);
+        (a, folds, together) = (part, of_folds, Some(of_all));
         let stacks = fit.stacks();
         for s in stacks.iter().filter(|_| correlated) {
             let inflation = match stacks.len() {
@@ -141,7 +143,7 @@ pub(super) fn of_records(
     };
     Ok(Factor {
         header,
-        together: linear::factor(&folds),
+        together: together.unwrap_or_else(|| linear::factor(&folds)),
         alone,
     })
 }
@@ -154,6 +156,8 @@ fn triangle(columns: &Mat<f64>) -> Mat<f64> {
 struct Solved {
     part: Part,
     folds: Vec<Mat<f64>>,
+    /// the triangle of all of them
+    together: Mat<f64>,
     /// rows that are as good as those of the records
     rows: Stack,
     estimate: merge::Estimate,
@@ -163,12 +167,14 @@ impl Solved {
     /// With so many base parameters.
     fn new(stacks: &[&Stack], count: usize) -> Result<Solved> {
         let (part, folds) = part(stacks, FOLDS);
-        let columns = columns_of(&part, &linear::factor(&folds));
+        let together = linear::factor(&folds);
+        let columns = columns_of(&part, &together);
         let rows = factor::equations(&part, Purpose::Fit, count, &columns);
         Ok(Solved {
             estimate: merge::estimate(&rows, &part, Method::Wls)?,
             part,
             folds,
+            together,
             rows,
         })
     }

@@ -24,7 +24,7 @@ use crate::plant::Plant;
 use crate::signals;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::{Mutex, mpsc};
 
 /// Rows that figures show of a record, or two periods where those are more.
 const SHOWN: usize = 60_000;
@@ -189,6 +189,11 @@ fn each_part<T: Send>(
     each: &mut dyn FnMut(T) -> Result<ControlFlow<()>>,
 ) -> Result<()> {
     let workers = rayon::current_num_threads().clamp(1, AT_ONCE);
+    // threads of their own: a part that is worked on need not wait for what another part or the reader asks for
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(workers)
+        .build()
+        .map_err(|e| Error::Infeasible(format!("no threads to work with: {e}")))?;
     std::thread::scope(|scope| {
         let (send, parts) = mpsc::sync_channel(1);
         let reader = scope.spawn(move || {
@@ -203,38 +208,42 @@ fn each_part<T: Send>(
             })
         });
         let (give, done) = mpsc::channel();
-        let parts = Arc::new(Mutex::new(parts));
-        for _ in 0..workers {
-            let (parts, give) = (Arc::clone(&parts), give.clone());
-            scope.spawn(move || {
-                loop {
-                    let next = parts.lock().map(|parts| parts.recv());
-                    let Ok(Ok((index, part))) = next else { break };
-                    if give.send((index, work(index, part))).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop((parts, give));
-        let mut waiting = BTreeMap::new();
-        let mut next = 0;
+        let parts = Mutex::new(parts);
         let mut ended = Ok(());
-        'parts: for (index, result) in &done {
-            waiting.insert(index, result);
-            while let Some(result) = waiting.remove(&next) {
-                next += 1;
-                match result.and_then(&mut *each) {
-                    Ok(ControlFlow::Continue(())) => {}
-                    Ok(ControlFlow::Break(())) => break 'parts,
-                    Err(e) => {
-                        ended = Err(e);
-                        break 'parts;
+        pool.in_place_scope(|scope| {
+            for _ in 0..workers {
+                let (parts, give) = (&parts, give.clone());
+                scope.spawn(move |_| {
+                    loop {
+                        let next = parts.lock().map(|parts| parts.recv());
+                        let Ok(Ok((index, part))) = next else { break };
+                        if give.send((index, work(index, part))).is_err() {
+                            break;
+                        }
+                    }
+                });
+            }
+            drop(give);
+            let mut waiting = BTreeMap::new();
+            let mut next = 0;
+            'parts: for (index, result) in &done {
+                waiting.insert(index, result);
+                while let Some(result) = waiting.remove(&next) {
+                    next += 1;
+                    match result.and_then(&mut *each) {
+                        Ok(ControlFlow::Continue(())) => {}
+                        Ok(ControlFlow::Break(())) => break 'parts,
+                        Err(e) => {
+                            ended = Err(e);
+                            break 'parts;
+                        }
                     }
                 }
             }
-        }
-        drop(done);
+            drop(done);
+        });
+        // nobody wants more
+        drop(parts);
         match reader.join() {
             Ok(read) => ended.and(read),
             Err(panic) => std::panic::resume_unwind(panic),

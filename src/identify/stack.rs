@@ -107,8 +107,10 @@ impl Stack {
                         for (c, to) in out.w.chunks_exact_mut(n * outputs).enumerate() {
                             let jump = jumps.iter().find(|j| j.0 == base.kept[c]);
                             let Some((_, joint)) = jump else { continue };
-                            let speeds = &motion.qd[joint * motion.count..][..motion.count];
-                            let signs: Vec<f64> = inputs.iter().map(|&i| sign(speeds[i])).collect();
+                            // one after the other: a motion that repeats is not thinned
+                            let from = joint * motion.count + inputs[0];
+                            let speeds = &motion.qd[from..][..inputs.len()];
+                            let signs: Vec<f64> = speeds.iter().map(|v| sign(*v)).collect();
                             let to = &mut to[joint * outputs..(joint + 1) * outputs];
                             p.filter.apply_part(&signs, range.clone(), to);
                         }

@@ -12,6 +12,9 @@ use crate::plant::Plant;
 use crate::robot::JointTerm;
 use crate::signals::{Prepared, standstill};
 
+/// Share of what the filter sees in which a joint is slow, beyond which it stands.
+const SHARE: f64 = 0.5;
+
 /// The fit records without the equations of joints that stand still, and what was left out; `None` where
 /// there is nothing to leave out.
 ///
@@ -42,12 +45,12 @@ pub fn left_out(
                 motion: joints[a].motion,
             };
             let slow = standstill::slow(joint, &motion.q[row.clone()], &motion.qd[row]);
-            if !slow.contains(&true) {
+            if !p.filter.may_exceed(&slow, SHARE) {
                 continue;
             }
             let still: Vec<f64> = slow.into_iter().map(f64::from).collect();
             for (k, share) in p.filter.apply(&still).into_iter().enumerate() {
-                if share > 0.5 {
+                if share > SHARE {
                     let all =
                         changed.get_or_insert_with(|| fit.iter().map(|s| (*s).clone()).collect());
                     all[r].leave_out(a, k);

@@ -11,7 +11,8 @@
 
 use crate::error::Result;
 use crate::signals::butterworth::{first_derivative, smoother};
-use crate::signals::{Prepared, Settings, cutoff, mean};
+use crate::signals::cutoff::{self, Spectra};
+use crate::signals::{Prepared, Settings, mean};
 
 /// A function counts period by period where the speed is below so many of the largest deviation.
 const NEAR: f64 = 4.0;
@@ -65,11 +66,9 @@ fn turns(record: &Prepared, a: usize, speed: &[f64]) -> Result<Vec<(usize, Vec<f
         .flat_map(|q| q.iter().zip(&middle).map(|(q, m)| q - m))
         .collect();
     let (rate, order) = (record.rate, Settings::default().order);
-    let low = smoother(
-        order,
-        cutoff::aperiodic(&off, rate, order, usize::MAX).frequency,
-        rate,
-    )?;
+    let spectra = Spectra::fine(off.len(), rate, usize::MAX);
+    let cutoff = cutoff::aperiodic(&off, &spectra, order).frequency;
+    let low = smoother(order, cutoff, rate)?;
     let rates = first_derivative(&low(&off), 1.0 / rate);
     let near = |(i, v): (usize, &f64)| {
         let each = (0..p.count).map(|k| rates[k * n + i]);

@@ -1,6 +1,7 @@
 //! Channels that cannot be what was measured: saturated, stuck, dropped, in other units.
 
 use crate::error::{Warning, WarningKind};
+use crate::extremes::extremes;
 use crate::median::median;
 use crate::robot::{Joint, Motion};
 use std::f64::consts::PI;
@@ -32,27 +33,6 @@ pub struct Clipped {
 
 /// Samples of a run at the least that clipping is told by.
 const SHORTEST: usize = 5;
-
-/// Smallest and largest of the finite values; `[inf, -inf]` where there is none.
-pub(super) fn extremes(y: &[f64]) -> [f64; 2] {
-    /// Values that are compared side by side.
-    const WIDE: usize = 8;
-    let (mut low, mut high) = ([f64::INFINITY; WIDE], [f64::NEG_INFINITY; WIDE]);
-    let mut chunks = y.chunks_exact(WIDE);
-    let mut take = |k: usize, x: f64| {
-        let finite = x.abs() < f64::INFINITY;
-        low[k] = if finite && x < low[k] { x } else { low[k] };
-        high[k] = if finite && x > high[k] { x } else { high[k] };
-    };
-    for chunk in &mut chunks {
-        (0..WIDE).for_each(|k| take(k, chunk[k]));
-    }
-    chunks.remainder().iter().for_each(|x| take(0, *x));
-    [
-        low.into_iter().fold(f64::INFINITY, f64::min),
-        high.into_iter().fold(f64::NEG_INFINITY, f64::max),
-    ]
-}
 
 /// The samples of a torque channel that stand at its largest or smallest value for long, as clipping makes them.
 ///
@@ -108,12 +88,11 @@ pub fn saturated(y: &[f64], effort: f64) -> Option<Clipped> {
     worst
 }
 
-/// Runs of equal values longer than a tenth of a second while `moving` says that the joint moves
-/// (at at least half of the run).
-pub fn stuck(y: &[f64], step: f64, moving: &[bool]) -> Vec<Range<usize>> {
+/// Runs of equal values longer than a tenth of a second while any of these joints moves (at at least half of the run).
+pub fn stuck(y: &[f64], step: f64, joints: &[Moving]) -> Vec<Range<usize>> {
     stuck_where(y, step, |range| {
         let length = range.len();
-        2 * moving[range].iter().filter(|m| **m).count() >= length
+        2 * range.filter(|i| joints.iter().any(|j| j.at(*i))).count() >= length
     })
 }
 
@@ -133,23 +112,68 @@ pub fn stuck_encoder(y: &[f64], command: &[f64], step: f64) -> Vec<Range<usize>>
 
 fn stuck_where(y: &[f64], step: f64, counts: impl Fn(Range<usize>) -> bool) -> Vec<Range<usize>> {
     let least = ((0.1 / step).ceil() as usize).max(20);
-    runs(y)
-        .filter(|run| run.len() >= least && counts(run.clone()))
-        .collect()
+    let mut out = long_runs(y, least);
+    out.retain(|run| counts(run.clone()));
+    out
 }
 
-/// Whether a position channel moves, sample by sample, from how far it is from a quarter of a
-/// tenth of a second before and after.
-pub fn moving(y: &[f64], step: f64) -> Vec<bool> {
-    let k = ((0.025 / step) as usize).max(2);
-    let n = y.len();
-    let far = |i: usize| {
-        let (a, b) = (i.saturating_sub(k), i.saturating_add(k).min(n - 1));
-        (y[b] - y[a]).abs()
-    };
-    let [low, high] = extremes(y);
-    let enough = 1e-4 * (high - low);
-    (0..n).map(|i| high > low && far(i) > enough).collect()
+/// Runs of `least` equal neighbours or more, of two at least.
+fn long_runs(y: &[f64], least: usize) -> Vec<Range<usize>> {
+    let mut out = Vec::new();
+    // every run that is long enough holds one of these and the sample before it
+    let stride = least.max(2) - 1;
+    let mut probe = stride;
+    while probe < y.len() {
+        let value = y[probe];
+        if y[probe - 1] != value {
+            probe += stride;
+            continue;
+        }
+        let same = |x: &&f64| **x == value;
+        let start = probe - y[..probe].iter().rev().take_while(same).count();
+        let end = probe + y[probe..].iter().take_while(same).count();
+        if end - start >= least {
+            out.push(start..end);
+        }
+        probe = end + stride;
+    }
+    out
+}
+
+/// Whether a position channel moves, from how far it is from a quarter of a tenth of a second before and after.
+pub struct Moving<'a> {
+    y: &'a [f64],
+    /// samples to either side
+    reach: usize,
+    /// beyond which it moves; infinite for a channel that never does
+    enough: f64,
+}
+
+impl<'a> Moving<'a> {
+    /// Of a channel with this time between its samples, s.
+    pub fn new(y: &'a [f64], step: f64) -> Self {
+        let [low, high] = extremes(y);
+        Moving {
+            y,
+            reach: ((0.025 / step) as usize).max(2),
+            enough: match high > low {
+                true => 1e-4 * (high - low),
+                false => f64::INFINITY,
+            },
+        }
+    }
+
+    /// At a sample.
+    pub fn at(&self, i: usize) -> bool {
+        let last = self.y.len() - 1;
+        let (a, b) = (i.saturating_sub(self.reach), i.saturating_add(self.reach));
+        (self.y[b.min(last)] - self.y[a]).abs() > self.enough
+    }
+
+    /// Anywhere.
+    pub fn ever(&self) -> bool {
+        (0..self.y.len()).any(|i| self.at(i))
+    }
 }
 
 /// What the range of a joint's positions says about their unit, if anything.
@@ -228,25 +252,28 @@ mod tests {
         }
     }
 
+    /// Long runs are those among all runs, wherever they begin and however long they are.
     #[test]
-    fn extremes_are_those_of_the_finite_values() {
-        let mut y: Vec<f64> = (0..29).map(|i| (1.7 * i as f64).sin()).collect();
-        let naive = |y: &[f64]| {
-            let finite = || y.iter().copied().filter(|x| x.is_finite());
-            [
-                finite().fold(f64::INFINITY, f64::min),
-                finite().fold(f64::NEG_INFINITY, f64::max),
-            ]
-        };
-        for (at, value) in [
-            (3, f64::NAN),
-            (28, f64::INFINITY),
-            (9, f64::NEG_INFINITY),
-            (17, 9.0),
-        ] {
-            y[at] = value;
-            assert_eq!(extremes(&y), naive(&y));
+    fn long_runs_are_the_long_ones_of_all_runs() {
+        let mut state = 5u64;
+        let mut found = 0;
+        for least in 1..9 {
+            for _ in 0..200 {
+                let mut y = Vec::new();
+                while y.len() < 60 {
+                    state = state.wrapping_mul(6364136223846793005).wrapping_add(1);
+                    let length = 1 + (state >> 40) as usize % (2 * least);
+                    let value = match state >> 60 {
+                        0 => f64::NAN,
+                        x => x as f64,
+                    };
+                    y.extend(std::iter::repeat_n(value, length));
+                }
+                let expected: Vec<_> = runs(&y).filter(|r| r.len() >= least.max(2)).collect();
+                found += expected.len();
+                assert_eq!(long_runs(&y, least.max(2)), expected, "{least}");
+            }
         }
-        assert_eq!(extremes(&[f64::NAN; 3]), [f64::INFINITY, f64::NEG_INFINITY]);
+        assert!(found > 1000, "{found}");
     }
 }

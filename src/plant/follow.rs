@@ -5,6 +5,8 @@ use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::mechanism::{Mechanism, follow};
 
+use std::borrow::Cow;
+
 pub use crate::mechanism::follow::Rates;
 
 impl Plant {
@@ -13,10 +15,10 @@ impl Plant {
     ///
     /// # Errors
     /// Positions that no pose of the assembly mode gives: the sample and the actuators.
-    pub fn coordinates_of(&self, q: &[Vec<f64>]) -> Result<Vec<Vec<f64>>> {
+    pub fn coordinates_of<'a>(&self, q: &'a [Vec<f64>]) -> Result<Cow<'a, [Vec<f64>]>> {
         match self.mechanism() {
-            None => Ok(q.to_vec()),
-            Some(mechanism) => Ok(lists(follow::forward(mechanism, q)?, q)),
+            None => Ok(Cow::Borrowed(q)),
+            Some(mechanism) => Ok(Cow::Owned(lists(follow::forward(mechanism, q)?, q))),
         }
     }
 
@@ -79,7 +81,8 @@ impl Plant {
             let rows = x.chunks_exact(moved.count);
             rows.map(|row| row[..count].to_vec()).collect()
         };
-        let x = self.coordinates_of(&once(&moved.q))?;
+        let q = once(&moved.q);
+        let x = self.coordinates_of(&q)?;
         let rates = self.rates_of(&x, &once(&moved.qd), Some(&once(&moved.qdd)))?;
         let again = |rows: &[Vec<f64>]| -> Vec<f64> {
             let all = rows.iter();

@@ -1,6 +1,6 @@
 //! The cut-off of the positions, from their spectrum.
 
-use super::fourier::{Plan, welch, welch_of};
+use super::fourier::{Plan, Welch, welch};
 use realfft::num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -47,29 +47,54 @@ fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
     high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
 }
 
-/// Spectrum of a position, one-sided, units²/Hz: that of its first difference, which has no trend to
-/// leak, divided by the difference's own. Of a long signal no more than so many windows are looked at.
-pub(super) fn spectrum_of(
-    q: &[f64],
+/// Spectra of positions of one length, of which no more than so many windows are looked at.
+pub struct Spectra {
+    welch: Welch,
     rate: f64,
-    length: usize,
-    windows: usize,
-) -> (Vec<f64>, Vec<f64>) {
-    let difference: Vec<f64> = q.windows(2).map(|w| w[1] - w[0]).collect();
-    let (f, mut density) = welch_of(&difference, rate, length, windows);
-    for (f, d) in f.iter().zip(&mut density) {
-        let gain = 2.0 * (PI * f / rate).sin();
-        *d /= (gain * gain).max(1e-300);
-    }
-    density[0] = 0.0;
-    (f, density)
 }
 
-/// Noise floor of a channel, units²/Hz: the median of its spectrum between 0.3 and 0.45 of the rate.
-pub fn floor(q: &[f64], rate: f64, windows: usize) -> f64 {
-    let length = (rate as usize).clamp(64, (q.len() / 2).max(64));
-    let (f, density) = spectrum_of(q, rate, length, windows);
-    noise_floor(&f, &density, rate)
+impl Spectra {
+    /// Of positions of `count` samples, with windows of `length`.
+    pub fn new(count: usize, rate: f64, length: usize, windows: usize) -> Self {
+        Spectra {
+            welch: Welch::new(count.saturating_sub(1), length, windows),
+            rate,
+        }
+    }
+
+    /// A tenth of a hertz to resolve the motion, and at least four windows to average.
+    pub fn fine(count: usize, rate: f64, windows: usize) -> Self {
+        let length = ((10.0 * rate) as usize).clamp(64, (count / 2).max(64));
+        Self::new(count, rate, length, windows)
+    }
+
+    /// A hertz, for the noise.
+    pub fn coarse(count: usize, rate: f64, windows: usize) -> Self {
+        let length = (rate as usize).clamp(64, (count / 2).max(64));
+        Self::new(count, rate, length, windows)
+    }
+
+    /// Spectrum of a position, one-sided, units²/Hz: that of its first difference, which has no trend to
+    /// leak, divided by the difference's own.
+    pub fn of(&self, q: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let put = |start: usize, to: &mut [f64]| {
+            let pairs = q[start..].windows(2);
+            to.iter_mut().zip(pairs).for_each(|(d, q)| *d = q[1] - q[0]);
+        };
+        let (f, mut density) = self.welch.density(self.rate, put);
+        for (f, d) in f.iter().zip(&mut density) {
+            let gain = 2.0 * (PI * f / self.rate).sin();
+            *d /= (gain * gain).max(1e-300);
+        }
+        density[0] = 0.0;
+        (f, density)
+    }
+
+    /// Noise floor of a channel, units²/Hz: the median of its spectrum between 0.3 and 0.45 of the rate.
+    pub fn floor(&self, q: &[f64]) -> f64 {
+        let (f, density) = self.of(q);
+        noise_floor(&f, &density, self.rate)
+    }
 }
 
 /// Standard deviation of the velocity that white noise of this floor, units²/Hz, makes of positions that
@@ -114,10 +139,9 @@ pub fn bandwidth(q: &[f64], rate: f64) -> f64 {
 /// `order` is that of one pass of the Butterworth filter, whose gain `1/(1 + (f/f_c)^{2N})` decides what
 /// passes. What is lost of the signal is the same in every sample and does not average out in the
 /// estimate as noise does; it counts a hundredfold.
-pub fn aperiodic(q: &[f64], rate: f64, order: usize, windows: usize) -> Cutoff {
-    // a tenth of a hertz to resolve the motion, and at least four windows to average
-    let length = ((10.0 * rate) as usize).clamp(64, (q.len() / 2).max(64));
-    let (f, density) = spectrum_of(q, rate, length, windows);
+pub fn aperiodic(q: &[f64], spectra: &Spectra, order: usize) -> Cutoff {
+    let rate = spectra.rate;
+    let (f, density) = spectra.of(q);
     let largest = density.iter().cloned().fold(0.0, f64::max);
     let floor = noise_floor(&f, &density, rate).max(ROUNDING * largest);
     // a line of noise here and there is no signal: means over neighbours decide
@@ -151,12 +175,17 @@ pub fn aperiodic(q: &[f64], rate: f64, order: usize, windows: usize) -> Cutoff {
     while cutoff > low && low > 0.0 {
         let own = power(cutoff);
         // gain c/(c + x) and what it leaves out, x/(c + x)
-        let error: f64 = (lines.iter())
-            .map(|[x, noise, signal]| {
-                let all = own + x;
-                (own * own * noise + x * x * signal) / (all * all)
-            })
-            .sum();
+        let of = |[x, noise, signal]: &[f64; 3]| {
+            let all = own + x;
+            (own * own * noise + x * x * signal) / (all * all)
+        };
+        // partial sums need not wait for each other
+        let mut sums = [0.0; 4];
+        for four in lines.chunks(4) {
+            let pairs = sums.iter_mut().zip(four);
+            pairs.for_each(|(sum, line)| *sum += of(line));
+        }
+        let error: f64 = sums.iter().sum();
         if error < best.0 {
             best = (error, cutoff);
         }

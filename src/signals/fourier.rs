@@ -19,14 +19,35 @@ impl Plan {
     /// # Panics
     /// If it is not as long as planned.
     pub fn spectrum(&self, mut x: Vec<f64>) -> Vec<Complex64> {
-        let Some(forward) = &self.0 else {
-            return Vec::new();
-        };
-        let mut out = forward.make_output_vec();
-        (forward.process(&mut x, &mut out))
-            .expect("signals are as long as their plan: the one error");
-        out
+        let mut room = self.room();
+        self.spectrum_in(&mut x, &mut room);
+        room.lines
     }
+
+    /// What [`Plan::spectrum_in`] works in.
+    fn room(&self) -> Room {
+        let of = |make: fn(&Arc<dyn RealToComplex<f64>>) -> Vec<Complex64>| {
+            self.0.as_ref().map_or(Vec::new(), make)
+        };
+        Room {
+            lines: of(|f| f.make_output_vec()),
+            scratch: of(|f| f.make_scratch_vec()),
+        }
+    }
+
+    /// The lines of the spectrum of a signal, which is used up.
+    fn spectrum_in(&self, x: &mut [f64], room: &mut Room) {
+        if let Some(forward) = &self.0 {
+            (forward.process_with_scratch(x, &mut room.lines, &mut room.scratch))
+                .expect("signals are as long as their plan: the one error");
+        }
+    }
+}
+
+/// Where a transform stands, and what it needs besides.
+struct Room {
+    lines: Vec<Complex64>,
+    scratch: Vec<Complex64>,
 }
 
 /// [`Plan::spectrum`] of one signal.
@@ -84,35 +105,56 @@ pub fn derivatives(x: &[f64], period: f64, highest: usize) -> [Vec<f64>; 3] {
 /// Power spectral density (one-sided, units²/Hz) by Welch's method: Hann windows of `length`
 /// samples that overlap by half, means removed. Returns frequencies and densities.
 pub fn welch(x: &[f64], rate: f64, length: usize) -> (Vec<f64>, Vec<f64>) {
-    welch_of(x, rate, length, usize::MAX)
+    let put = |start: usize, to: &mut [f64]| to.copy_from_slice(&x[start..start + to.len()]);
+    Welch::new(x.len(), length, usize::MAX).density(rate, put)
 }
 
-/// The same of no more than so many windows, evenly spread over a long signal.
-pub fn welch_of(x: &[f64], rate: f64, length: usize, most: usize) -> (Vec<f64>, Vec<f64>) {
-    let n = length.min(x.len()).max(2);
-    let window: Vec<f64> = (0..n)
-        .map(|i| 0.5 - 0.5 * (2.0 * PI * i as f64 / n as f64).cos())
-        .collect();
-    let power: f64 = window.iter().map(|w| w * w).sum();
-    let plan = Plan::new(n);
-    let bins = n / 2 + 1;
-    let mut sum = vec![0.0; bins];
-    let step = (n / 2).max(1);
-    let all = match x.len() >= n {
-        true => (x.len() - n) / step + 1,
-        false => 0,
-    };
-    let count = all.min(most.max(1));
-    for k in 0..count {
-        let start = k * all / count * step;
-        let part = &x[start..start + n];
-        let mean = part.iter().sum::<f64>() / n as f64;
-        let z = part.iter().zip(&window).map(|(v, w)| (v - mean) * w);
-        for (s, c) in sum.iter_mut().zip(plan.spectrum(z.collect())) {
-            *s += c.norm_sqr();
+/// What [`welch`] of signals of one length shares.
+pub struct Welch {
+    window: Vec<f64>,
+    plan: Plan,
+    /// first samples of the windows that are looked at
+    starts: Vec<usize>,
+}
+
+impl Welch {
+    /// Of signals of `samples`, with no more than so many windows, evenly spread.
+    pub fn new(samples: usize, length: usize, most: usize) -> Welch {
+        let n = length.min(samples).max(2);
+        let step = (n / 2).max(1);
+        let all = match samples >= n {
+            true => (samples - n) / step + 1,
+            false => 0,
+        };
+        let count = all.min(most.max(1));
+        let hann = |i: usize| 0.5 - 0.5 * (2.0 * PI * i as f64 / n as f64).cos();
+        Welch {
+            window: (0..n).map(hann).collect(),
+            plan: Plan::new(n),
+            starts: (0..count).map(|k| k * all / count * step).collect(),
         }
     }
-    let scale = 2.0 / (rate * power * count.max(1) as f64);
-    let frequencies = (0..bins).map(|k| k as f64 * rate / n as f64).collect();
-    (frequencies, sum.into_iter().map(|s| s * scale).collect())
+
+    /// Frequencies and densities of a signal; `put` writes its samples from the given one on.
+    pub fn density(&self, rate: f64, put: impl Fn(usize, &mut [f64])) -> (Vec<f64>, Vec<f64>) {
+        let n = self.window.len();
+        let power: f64 = self.window.iter().map(|w| w * w).sum();
+        let bins = n / 2 + 1;
+        let mut sum = vec![0.0; bins];
+        let mut room = self.plan.room();
+        let mut part = vec![0.0; n];
+        for start in &self.starts {
+            put(*start, &mut part);
+            let mean = part.iter().sum::<f64>() / n as f64;
+            let each = part.iter_mut().zip(&self.window);
+            each.for_each(|(v, w)| *v = (*v - mean) * w);
+            self.plan.spectrum_in(&mut part, &mut room);
+            for (s, c) in sum.iter_mut().zip(&room.lines) {
+                *s += c.norm_sqr();
+            }
+        }
+        let scale = 2.0 / (rate * power * self.starts.len().max(1) as f64);
+        let frequencies = (0..bins).map(|k| k as f64 * rate / n as f64).collect();
+        (frequencies, sum.into_iter().map(|s| s * scale).collect())
+    }
 }

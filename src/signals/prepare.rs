@@ -1,16 +1,19 @@
 //! From a record to a [`Prepared`] one.
 
-use super::butterworth::{first_derivative, second_derivative, smoother};
+use super::butterworth;
+use super::cutoff::Spectra;
 use super::{Decimator, Derivation, Periods, Prepared, Settings, Thin, cutoff, fourier, wiener};
 use crate::dynamics::Samples;
 use crate::error::{Error, Result, Warning, WarningKind};
+use crate::extremes::extremes;
 use crate::log::Record;
 use crate::plant::{self, Plant};
 use faer::Mat;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Windows that say what the spectrum of a part of a long log is.
-const WINDOWS: usize = 16;
+const WINDOWS: usize = 8;
 /// Samples that hold a motion, in cut-offs of its positions.
 const DENSITY: f64 = 8.0;
 /// Cut-off of the parallel filter, in bandwidths of the motion.
@@ -27,11 +30,7 @@ pub fn common_cutoff<'a>(records: impl IntoIterator<Item = &'a Record>) -> f64 {
     let mut highest = 0.0f64;
     for r in records {
         let spread = |q: &[f64]| {
-            let (low, high) = q
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &x| {
-                    (a.min(x), b.max(x))
-                });
+            let [low, high] = extremes(q);
             high - low
         };
         let most = r.q.iter().map(|q| spread(q)).fold(0.0, f64::max);
@@ -81,45 +80,22 @@ impl Prepared {
         let measured = measured_rates(record, plant, settings, &x)?;
         let dq = measured.as_ref().map(|m| &m.velocity);
         let ddq = measured.as_ref().and_then(|m| m.acceleration.as_ref());
-        let series: Vec<(f64, Rates)> = x
-            .par_iter()
-            .enumerate()
-            .map(|(j, q)| {
-                if let (Some(dq), Some(ddq)) = (dq, ddq) {
-                    let as_is = [q.clone(), dq[j].clone(), ddq[j].clone()];
-                    return Ok((f64::INFINITY, as_is));
-                }
-                if settings.derivation == Derivation::Wiener && dq.is_none() {
+        let (frequencies, motion) = match (dq, ddq) {
+            (Some(dq), Some(ddq)) => {
+                let all = |j: usize| [&x[j], &dq[j], &ddq[j]].map(Vec::clone);
+                let all = (0..x.len()).map(all).collect();
+                (vec![f64::INFINITY; x.len()], assemble(all))
+            }
+            (None, _) if settings.derivation == Derivation::Wiener => {
+                let derived = |q: &Vec<f64>| {
                     let d = wiener::differentiated(q, &[0.0], q.len(), None, record.step);
-                    return Ok((d.band, [d.motion.q, d.motion.qd, d.motion.qdd]));
-                }
-                let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
-                let frequency = match settings.position_cutoff {
-                    Some(f) => f,
-                    None => cutoff::aperiodic(q, rate, settings.order, windows)
-                        .frequency
-                        .min(most)
-                        .min(0.45 * rate),
+                    (d.band, [d.motion.q, d.motion.qd, d.motion.qdd])
                 };
-                let low = smoother(settings.order, frequency, rate)?;
-                let smooth = low(q);
-                Ok((
-                    frequency,
-                    match dq {
-                        Some(dq) => {
-                            let velocity = low(&dq[j]);
-                            let acceleration = first_derivative(&velocity, record.step);
-                            [smooth, velocity, acceleration]
-                        }
-                        None => {
-                            let velocity = first_derivative(&smooth, record.step);
-                            let acceleration = second_derivative(&smooth, record.step);
-                            [smooth, velocity, acceleration]
-                        }
-                    },
-                ))
-            })
-            .collect::<Result<_>>()?;
+                let (bands, all) = x.par_iter().map(derived).unzip();
+                (bands, assemble(all))
+            }
+            _ => low_passed(&x, dq.map(Vec::as_slice), record.step, settings, windows)?,
+        };
         let reason = match (dq, ddq, settings.position_cutoff) {
             (Some(_), Some(_), _) => "measured velocities and accelerations, taken as they are",
             (_, _, Some(_)) => "as asked for",
@@ -128,16 +104,14 @@ impl Prepared {
             _ => "least estimated error of the acceleration, at most 2.5 cut-offs of the torque",
         };
         let mut valid = record.valid.clone();
-        let frequencies: Vec<f64> = series.iter().map(|s| s.0).collect();
         let highest = frequencies.iter().cloned().fold(0.0, f64::max);
-        let noise_of = |q: &Vec<f64>| {
-            let floor = cutoff::floor(q, rate, windows);
-            cutoff::velocity_noise(floor, highest.min(0.5 * rate))
-        };
+        let coarse = Spectra::coarse(record.len(), rate, windows);
+        let noise_of =
+            |q: &Vec<f64>| cutoff::velocity_noise(coarse.floor(q), highest.min(0.5 * rate));
         let velocity_noise = match dq.and(record.dq.as_ref()) {
             // as measured, at most up to half the rate
             Some(dq) => (dq.iter())
-                .map(|v| (cutoff::floor(v, rate, windows) * highest.min(0.5 * rate)).sqrt())
+                .map(|v| (coarse.floor(v) * highest.min(0.5 * rate)).sqrt())
                 .collect(),
             None => record.q.iter().map(noise_of).collect(),
         };
@@ -155,7 +129,7 @@ impl Prepared {
                 purpose: record.purpose,
                 rate,
                 time: record.t.clone(),
-                motion: assemble(series.into_iter().map(|s| s.1).collect()),
+                motion,
                 torque: record.tau.concat(),
                 actuators: record.actuators(),
                 valid,
@@ -303,6 +277,56 @@ impl Prepared {
     }
 }
 
+/// Cut-offs, Hz, and low-passed positions with their derivatives; with measured velocities those, low-passed alike.
+fn low_passed(
+    x: &[Vec<f64>],
+    dq: Option<&[Vec<f64>]>,
+    step: f64,
+    settings: &Settings,
+    windows: usize,
+) -> Result<(Vec<f64>, Samples)> {
+    let (order, rate) = (settings.order, 1.0 / step);
+    let count = x.first().map_or(0, Vec::len);
+    let most = MARGIN * settings.cutoff.unwrap_or(f64::INFINITY);
+    let cutoffs: Vec<f64> = match settings.position_cutoff {
+        Some(f) => vec![f; x.len()],
+        None => {
+            let spectra = Spectra::fine(count, rate, windows);
+            let of = |q: &Vec<f64>| cutoff::aperiodic(q, &spectra, order).frequency;
+            let found = x.par_iter().map(of);
+            found.map(|f| f.min(most).min(0.45 * rate)).collect()
+        }
+    };
+    let low = |x: &[Vec<f64>]| butterworth::smooth(order, rate, &cutoffs, x);
+    let q = low(x)?;
+    let mut qdd = vec![0.0; q.len()];
+    let rows = |x: &mut [f64], y: &[f64], derive: fn(&[f64], f64, &mut [f64])| {
+        let rows = x.par_chunks_mut(count.max(1));
+        (rows.zip(y.par_chunks(count.max(1)))).for_each(|(to, from)| derive(from, step, to));
+    };
+    let qd = match dq {
+        Some(dq) => {
+            let qd = low(dq)?;
+            rows(&mut qdd, &qd, butterworth::first_derivative_into);
+            qd
+        }
+        None => {
+            let mut qd = vec![0.0; q.len()];
+            rows(&mut qd, &q, butterworth::first_derivative_into);
+            rows(&mut qdd, &q, butterworth::second_derivative_into);
+            qd
+        }
+    };
+    let motion = Samples {
+        dof: x.len(),
+        count,
+        q,
+        qd,
+        qdd,
+    };
+    Ok((cutoffs, motion))
+}
+
 /// Whole periods of a record that is averaged: two or more, which make up at least nine tenths of it
 /// (what is left over would be lost).
 pub fn averaged(record: &Record) -> Option<usize> {
@@ -398,10 +422,14 @@ fn measured_rates(
 }
 
 /// Coordinates over the whole record.
-fn coordinates(record: &Record, plant: &Plant, settings: &Settings) -> Result<Vec<Vec<f64>>> {
+fn coordinates<'a>(
+    record: &'a Record,
+    plant: &Plant,
+    settings: &Settings,
+) -> Result<Cow<'a, [Vec<f64>]>> {
     match (&record.pose, settings.measured_pose) {
         (_, false) => plant.coordinates_of(&record.q),
-        (Some(pose), true) => plant.coordinates_of_pose(pose),
+        (Some(pose), true) => plant.coordinates_of_pose(pose).map(Cow::Owned),
         (None, true) => Err(Error::Argument(format!(
             "{} has no pose columns x y z qw qx qy qz",
             record.path.display()

@@ -6,6 +6,7 @@
 //! of its fastest, and in all of a record in which it moves by less than half a degree or half a millimetre: an arm
 //! that is held and pushed gives by that much. A reversal is slow for a moment only; [`lasting`] keeps it.
 
+use crate::extremes::extremes;
 use crate::robot::Motion;
 
 /// Standard deviations of the velocity within which a joint may stand still.
@@ -32,8 +33,7 @@ pub struct Joint {
 
 /// Whether a joint is so slow that it may stand, sample by sample, from its position and velocity in one record.
 pub fn slow(joint: Joint, q: &[f64], v: &[f64]) -> Vec<bool> {
-    let ends = |[a, b]: [f64; 2], x: &f64| [a.min(*x), b.max(*x)];
-    let [low, high] = q.iter().fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+    let [low, high] = extremes(q);
     let held = match joint.motion {
         Motion::Revolute => HELD[0],
         Motion::Prismatic => HELD[1],
@@ -41,7 +41,8 @@ pub fn slow(joint: Joint, q: &[f64], v: &[f64]) -> Vec<bool> {
     if high - low - 2.0 * SCATTER * joint.position_noise < held {
         return vec![true; v.len()];
     }
-    let fastest = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let [back, forth] = extremes(v);
+    let fastest = back.abs().max(forth.abs());
     let least = (SIGMAS * joint.velocity_noise).max(SLOW * fastest);
     v.iter().map(|x| x.abs() <= least).collect()
 }

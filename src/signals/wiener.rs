@@ -6,7 +6,7 @@
 //! repeats exactly hides them in every period alike. Differentiation is exact and needs no
 //! filter. Otherwise the positions pass a zero-phase low-pass and central differences.
 
-use super::cutoff::spectrum_of;
+use super::cutoff::Spectra;
 use super::fourier::{Inverse, Plan};
 use super::repeats::scatter;
 use crate::dynamics::Samples;
@@ -197,7 +197,7 @@ impl Filter {
     pub fn of(q: &[f64], variance: f64, dt: f64) -> Option<Filter> {
         let count = q.len();
         let length = ((STRETCH / dt) as usize).clamp(64, (count / 2).max(64));
-        let (f, density) = spectrum_of(q, 1.0 / dt, length, usize::MAX);
+        let (f, density) = Spectra::new(q.len(), 1.0 / dt, length, usize::MAX).of(q);
         let noise = 2.0 * variance * dt;
         let of = |k: usize| (1.0 - noise / density[k].max(1e-300)).max(0.0);
         // the first line is that of the trend

@@ -2,6 +2,8 @@
 
 use crate::common::noise::normal;
 use excite::signals::butterworth::{Butterworth, first_derivative, second_derivative};
+use excite::signals::cutoff::Spectra;
+use excite::signals::fourier::Welch;
 use excite::signals::{Decimator, cutoff, fourier};
 use rand::{Rng, SeedableRng};
 use std::f64::consts::PI;
@@ -211,7 +213,8 @@ fn the_cutoff_lies_where_motion_sinks_into_noise() {
             (2.0 * PI * 0.7 * t).sin() + 0.1 * (2.0 * PI * 6.0 * t).sin() + 1e-5 * noise
         })
         .collect();
-    let c = cutoff::aperiodic(&q, rate, 4, usize::MAX);
+    let spectra = Spectra::fine(q.len(), rate, usize::MAX);
+    let c = cutoff::aperiodic(&q, &spectra, 4);
     assert!((12.0..40.0).contains(&c.frequency), "{}", c.frequency);
     let truth = 2.0 * 1e-10 / rate;
     assert!(
@@ -325,10 +328,9 @@ fn a_few_windows_give_the_level_of_all() {
     let x: Vec<f64> = (0..60_000).map(|_| normal(&mut rng)).collect();
     let mean = |(_, d): (Vec<f64>, Vec<f64>)| d.iter().sum::<f64>() / d.len() as f64;
     let all = mean(fourier::welch(&x, 1.0, 1000));
-    let few = mean(fourier::welch_of(&x, 1.0, 1000, 16));
+    let put = |from: usize, to: &mut [f64]| to.copy_from_slice(&x[from..from + to.len()]);
+    let of = |most| Welch::new(x.len(), 1000, most).density(1.0, put);
+    let few = mean(of(16));
     assert!((few / all - 1.0).abs() < 0.05, "{few} {all}");
-    assert_eq!(
-        fourier::welch(&x, 1.0, 1000),
-        fourier::welch_of(&x, 1.0, 1000, 1 << 20)
-    );
+    assert_eq!(fourier::welch(&x, 1.0, 1000), of(1 << 20));
 }

@@ -401,7 +401,8 @@ fn append(
     };
     let pieces: Vec<Piece> = cut(text)
         .into_par_iter()
-        .map(|p| piece(p, delimiter, &dialect.cells, keep))
+        .flat_map_iter(|p| piece(p, delimiter, &dialect.cells, keep))
+        .filter(|p| p.lines > 0)
         .collect();
     let columns = table.columns.par_iter_mut().enumerate();
     columns.for_each(|(k, column)| {
@@ -466,23 +467,76 @@ fn cut(text: &[u8]) -> Vec<&[u8]> {
     pieces
 }
 
-/// Parses the lines of one piece.
-fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
-    let n = keep.len();
-    let mut out = Piece {
-        columns: vec![Vec::new(); n],
+/// Parses the lines of one piece, in two parts.
+fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> [Piece; 2] {
+    let middle = text.len() / 2;
+    let end = text[middle..].iter().position(|b| *b == b'\n');
+    let halves = text.split_at(end.map_or(text.len(), |at| middle + at + 1));
+    let (a, b) = halves;
+    let [mut x, mut y] = [a, b].map(|text| empty(text, keep));
+    let usual = |k: usize| keep[k] && cells[k] == Cell::Number;
+    let [p, q] = match (0..keep.len()).all(usual) {
+        true => abreast([a, b], delimiter, [&mut x, &mut y]),
+        false => [0, 0],
+    };
+    rest(a, p, delimiter, cells, keep, &mut x);
+    rest(b, q, delimiter, cells, keep, &mut y);
+    [x, y]
+}
+
+/// A piece with room for the lines of a text.
+fn empty(text: &[u8], keep: &[bool]) -> Piece {
+    let first = text.iter().position(|&b| b == b'\n').unwrap_or(text.len());
+    let rows = text.len() / first.max(8) + 16;
+    let room = |keep: &bool| Vec::with_capacity(if *keep { rows } else { 0 });
+    Piece {
+        columns: keep.iter().map(room).collect(),
         lines: 0,
         bad: Vec::new(),
         count: 0,
         last: false,
-    };
-    let first = text.iter().position(|&b| b == b'\n').unwrap_or(text.len());
-    let rows = text.len() / first.max(8) + 16;
-    for (column, keep) in out.columns.iter_mut().zip(keep) {
-        column.reserve(if *keep { rows } else { 0 });
     }
+}
+
+/// Parses lines of two texts at the same time, as long as both are plain numbers: where a number ends is known late, and
+/// meanwhile the other one goes on. Returns where it stopped in each.
+fn abreast(texts: [&[u8]; 2], delimiter: u8, out: [&mut Piece; 2]) -> [usize; 2] {
+    let [x, y] = out;
+    let n = x.columns.len();
+    let mut row = vec![[0.0; 2]; n];
+    let mut brief = vec![[true; 2]; n];
+    let mut at = [0; 2];
+    loop {
+        let [mut p, mut q] = at;
+        for (k, (to, brief)) in row.iter_mut().zip(&mut brief).enumerate() {
+            let a = number::plain(texts[0], p, delimiter, &mut brief[0]);
+            let b = number::plain(texts[1], q, delimiter, &mut brief[1]);
+            let (Some((u, a)), Some((v, b))) = (a, b) else {
+                return at;
+            };
+            let last = k + 1 == n;
+            if (texts[0][a] == b'\n') != last || (texts[1][b] == b'\n') != last {
+                return at;
+            }
+            *to = [u, v];
+            (p, q) = (a + 1, b + 1);
+        }
+        at = [p, q];
+        for (k, [u, v]) in row.iter().enumerate() {
+            x.columns[k].push(*u);
+            y.columns[k].push(*v);
+        }
+        x.lines += 1;
+        y.lines += 1;
+    }
+}
+
+/// Parses the lines of a text from a place on.
+fn rest(text: &[u8], from: usize, delimiter: u8, cells: &[Cell], keep: &[bool], out: &mut Piece) {
+    let n = keep.len();
     let mut row = vec![0.0; n];
-    let mut at = 0;
+    let mut brief = vec![true; n];
+    let mut at = from;
     while at < text.len() {
         out.lines += 1;
         out.last = false;
@@ -502,7 +556,7 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
             if k < n
                 && keep[k]
                 && cells[k] == Cell::Number
-                && let Some((x, end)) = number::plain(text, at, delimiter)
+                && let Some((x, end)) = number::plain(text, at, delimiter, &mut brief[k])
             {
                 row[k] = x;
                 k += 1;
@@ -569,7 +623,6 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> Piece {
             }
         }
     }
-    out
 }
 
 /// The names of the columns.

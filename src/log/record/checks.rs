@@ -1,9 +1,11 @@
 //! What is wrong with the channels of a log: dropped, stuck and saturated values, units, periods.
 
 use crate::error::{Error, Result, Warning, WarningKind, agreeing, counted};
+use crate::extremes::all_finite;
+use crate::log::Record;
+use crate::log::channels::{self, Moving};
 use crate::log::clock::Clock;
 use crate::log::resample::fill;
-use crate::log::{Record, channels};
 use crate::robot::Joint;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -24,7 +26,10 @@ impl Record {
         let mut valid = std::mem::take(&mut self.valid);
         let (mut warnings, mut ends, mut missing) = (Vec::new(), Vec::new(), 0);
         let channels = self.channels();
-        let holes = |y: &[f64]| (0..y.len()).filter(|&i| !y[i].is_finite()).collect();
+        let holes = |y: &[f64]| match all_finite(y) {
+            true => Vec::new(),
+            false => (0..y.len()).filter(|&i| !y[i].is_finite()).collect(),
+        };
         let all: Vec<Vec<usize>> = channels.par_iter().map(|(.., c)| holes(c)).collect();
         for ((name, order, column), holes) in channels.into_iter().zip(all) {
             let Some(&first) = holes.first() else {
@@ -82,14 +87,8 @@ impl Record {
     pub(super) fn check_channels(&mut self, joints: &[&Joint]) -> Result<()> {
         let subject = self.path.display().to_string();
         let step = self.step;
-        let moving: Vec<Vec<bool>> = self
-            .q
-            .par_iter()
-            .map(|q| channels::moving(q, step))
-            .collect();
-        let still: Vec<usize> = (0..joints.len())
-            .filter(|&j| !moving[j].contains(&true))
-            .collect();
+        let moving: Vec<Moving> = self.q.par_iter().map(|q| Moving::new(q, step)).collect();
+        let still: Vec<usize> = (0..joints.len()).filter(|&j| !moving[j].ever()).collect();
         if still.len() == joints.len() {
             return Err(Error::file(
                 &self.path,
@@ -107,10 +106,7 @@ impl Record {
                 ),
             ));
         }
-        let any: Vec<bool> = (0..self.valid.len())
-            .map(|i| moving.iter().any(|m| m[i]))
-            .collect();
-        let check = |(j, joint): (usize, &&Joint)| self.check_actuator(j, joint, &any);
+        let check = |(j, joint): (usize, &&Joint)| self.check_actuator(j, joint, &moving);
         let found: Vec<(Vec<Warning>, Vec<Range<usize>>)> =
             joints.par_iter().enumerate().map(check).collect();
         for (warnings, out) in found {
@@ -134,12 +130,12 @@ impl Record {
         Ok(())
     }
 
-    /// What is wrong with the channels of actuator `j`, and which samples are left out for it; `moving` says when any moves.
+    /// What is wrong with the channels of actuator `j`, and which samples are left out for it; `moving` says when each moves.
     fn check_actuator(
         &self,
         j: usize,
         joint: &Joint,
-        moving: &[bool],
+        moving: &[Moving],
     ) -> (Vec<Warning>, Vec<Range<usize>>) {
         let subject = self.path.display();
         let (q, step) = (&self.q[j], self.step);
