@@ -24,7 +24,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Rows of a part.
-const PART: usize = 250_000;
+const PART: usize = 240_000;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // as the program does

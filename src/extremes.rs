@@ -2,6 +2,21 @@
 
 /// Smallest and largest of the finite values; `[inf, -inf]` where there is none.
 pub(crate) fn extremes(y: &[f64]) -> [f64; 2] {
+    let all = ends(y);
+    let infinite = all[0] == f64::NEG_INFINITY || all[1] == f64::INFINITY;
+    match infinite {
+        false => all,
+        true => {
+            let finite = y.iter().filter(|x| x.is_finite());
+            finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
+                [a.min(*x), b.max(*x)]
+            })
+        }
+    }
+}
+
+/// Smallest and largest of all values but NaN.
+fn ends(y: &[f64]) -> [f64; 2] {
     /// Values that are compared side by side.
     const WIDE: usize = 8;
     let (mut low, mut high) = ([f64::INFINITY; WIDE], [f64::NEG_INFINITY; WIDE]);
@@ -15,20 +30,10 @@ pub(crate) fn extremes(y: &[f64]) -> [f64; 2] {
         (0..WIDE).for_each(|k| take(k, chunk[k]));
     }
     chunks.remainder().iter().for_each(|x| take(0, *x));
-    let all = [
+    [
         low.into_iter().fold(f64::INFINITY, f64::min),
         high.into_iter().fold(f64::NEG_INFINITY, f64::max),
-    ];
-    let infinite = all[0] == f64::NEG_INFINITY || all[1] == f64::INFINITY;
-    match infinite {
-        false => all,
-        true => {
-            let finite = y.iter().filter(|x| x.is_finite());
-            finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
-                [a.min(*x), b.max(*x)]
-            })
-        }
-    }
+    ]
 }
 
 /// Whether all values are finite.

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 /// Rows of a part of a log that is read in parts.
-const PART: usize = 250_000;
+const PART: usize = 240_000;
 
 /// Identify the model from recorded runs.
 #[derive(clap::Args)]
@@ -74,7 +74,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     identify: Option<Vec<String>>,
     /// Read the logs in parts of so many rows, and hold a few of them at a time; 0 reads them whole [default:
-    /// 250000 where a CSV has more than 100 MB or a bag more than 50 MB, else 0]
+    /// 240000 where a CSV has more than 100 MB or a bag more than 50 MB, else 0]
     #[arg(long, value_name = "N")]
     rows: Option<usize>,
     /// Pressure outside of the cylinders, Pa, for logs with chamber pressures in place of forces; 0 where those are

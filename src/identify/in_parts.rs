@@ -161,9 +161,9 @@ pub fn condense_parts(
     })
 }
 
-/// Whether the variance through correlation in time is looked for in a part: of a long record a fourth of them say enough.
+/// Whether the variance through correlation in time is looked for in a part: of a long record an eighth of them say enough.
 fn correlated(index: usize) -> bool {
-    index < 4 || index.is_multiple_of(4)
+    index < 4 || index.is_multiple_of(8)
 }
 
 /// What becomes of a part.
