@@ -157,6 +157,11 @@ fn long(plant: &Plant, path: &Path, rows: usize) -> Result<(), Box<dyn std::erro
         model.condition
     );
 
+    let start = Instant::now();
+    let found = survey::survey(&[path.to_path_buf()], Some(plant))?;
+    assert_eq!(found.frames[0].rows, rows);
+    said("its columns told, as `excite log` does", start, size);
+
     // columns as they stand, and all of them: last, because it holds what the others need not
     let start = Instant::now();
     let table = Table::read(path, &|_| true)?;

@@ -30,6 +30,10 @@ pub struct Args {
     /// Replace files that exist
     #[arg(long)]
     force: bool,
+    /// Read the log in parts of so many rows, and hold a few of them at a time; 0 reads it whole [default: 400000, or fewer of
+    /// more than 20 columns, where it has more than 500 MB, else 0]
+    #[arg(long, value_name = "N")]
+    rows: Option<usize>,
     /// Print log.json to standard output instead of a summary
     #[arg(long)]
     json: bool,
@@ -37,7 +41,7 @@ pub struct Args {
 
 pub fn run(args: Args) -> Result<()> {
     let robot = args.robot.as_deref().map(Plant::load).transpose()?;
-    let found = survey::survey(&args.files, robot.as_ref())?;
+    let found = survey::survey_in_parts(&args.files, robot.as_ref(), args.rows)?;
     let folder = Folder::new(
         &args.output,
         &["log.json", "experiment.toml", "report.html"],

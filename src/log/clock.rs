@@ -186,9 +186,14 @@ fn spread(t: &mut [f64]) {
         .for_each(|(i, x)| *x = a + (i as f64 - from as f64) * step);
 }
 
+/// Whether a step is far longer than the usual one.
+pub(crate) fn is_gap(ahead: f64, step: f64) -> bool {
+    ahead > GAP * step
+}
+
 /// From and to of each step that is far too long.
 fn gaps(t: &[f64], step: f64) -> Vec<[f64; 2]> {
-    let long = |w: &&[f64]| w[1] - w[0] > GAP * step;
+    let long = |w: &&[f64]| is_gap(w[1] - w[0], step);
     t.windows(2).filter(long).map(|w| [w[0], w[1]]).collect()
 }
 

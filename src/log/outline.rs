@@ -241,12 +241,12 @@ impl Outline {
     pub fn is_long(&self) -> bool {
         let long = |path: &PathBuf| {
             let bag = path.extension().is_some_and(|e| e == "mcap" || e == "db3");
-            size(path)
-                > if bag || path.is_dir() {
-                    LONG_BAG
-                } else {
-                    LONG_TEXT
-                }
+            let most = if bag || path.is_dir() {
+                LONG_BAG
+            } else {
+                LONG_TEXT
+            };
+            size(path) > most
         };
         self.entries.iter().any(|e| e.logs.iter().any(long))
     }

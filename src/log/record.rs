@@ -5,7 +5,7 @@ mod cut;
 mod reading;
 
 pub(crate) use cut::{impossible, unmeasured};
-pub(crate) use reading::Reading;
+pub(crate) use reading::{Reading, long_enough};
 
 use super::clock::{self, Clock};
 use super::resample::{Order, interpolate};

@@ -3,6 +3,7 @@
 use super::claim::{Claim, Means};
 use super::file_name;
 use crate::error::{Error, Result, Warning, WarningKind, agreeing};
+use crate::extremes::extremes;
 use crate::log::Table;
 use crate::log::channels;
 use crate::log::clock;
@@ -40,6 +41,13 @@ pub struct Frame {
     pub time_unit: &'static str,
     /// step of the grid, s
     pub step: f64,
+    /// where the grid begins, s from the start of the record: 0 unless it is a part of a long one
+    pub start: f64,
+    /// length of the record, s
+    pub length: f64,
+    /// first and last stamp as logged, and what makes seconds of them
+    pub(super) stamps: [f64; 2],
+    pub(super) factor: f64,
     /// the columns on the grid
     pub columns: Vec<Vec<f64>>,
     /// from and to of each gap, s from the start
@@ -48,6 +56,17 @@ pub struct Frame {
     pub silent: Vec<usize>,
     /// what was wrong
     pub warnings: Vec<Warning>,
+}
+
+/// What the time of a record is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ticks {
+    /// number of its column
+    column: Option<usize>,
+    /// what makes seconds of it
+    factor: f64,
+    /// samples a second, where no column is a time
+    rate: Option<f64>,
 }
 
 /// What a joint does in a record.
@@ -64,7 +83,13 @@ pub struct Course {
 }
 
 impl Frame {
-    pub(super) fn new(paths: Vec<PathBuf>, mut table: Table, format: Format) -> Result<Self> {
+    /// From a table; `like` is another part of the same log, which says what the time is.
+    pub(super) fn new(
+        paths: Vec<PathBuf>,
+        mut table: Table,
+        format: Format,
+        like: Option<Ticks>,
+    ) -> Result<Self> {
         let path = paths.first().cloned().unwrap_or_default();
         let rows = table.rows();
         let subject = file_name(&path);
@@ -75,14 +100,17 @@ impl Frame {
         if rows < 8 {
             return Err(Error::file(&path, "", too_few(rows, &warnings)));
         }
-        let found = match Layout::time_of(&table, format) {
-            Some(Time::Column(Place::Number(k), factor)) => Some((k - 1, factor)),
-            _ => even(&table).map(|k| (k, None)),
+        let found = match (like, Layout::time_of(&table, format)) {
+            (Some(like), _) => like.column.map(|k| (k, Some(like.factor))),
+            (None, Some(Time::Column(Place::Number(k), factor))) => Some((k - 1, factor)),
+            (None, _) => even(&table).map(|k| (k, None)),
         };
+        let (mut stamps, mut to_seconds) = (Vec::new(), 1.0);
         let (raw, time_name) = match found {
             Some((k, factor)) => {
                 let (guess, name) = time_unit(&table.columns[k]);
                 let factor = factor.unwrap_or(guess);
+                to_seconds = factor;
                 let name = [
                     ("s", 1.0),
                     ("ms", 1e-3),
@@ -103,7 +131,7 @@ impl Frame {
             }
             None => ((0..rows).map(|i| i as f64).collect::<Vec<f64>>(), "none"),
         };
-        let clock = clock::repair(&raw, 0, &subject);
+        let clock = clock::repair(&raw, table.before, &subject);
         warnings.extend(
             clock
                 .warnings
@@ -119,6 +147,11 @@ impl Frame {
             return Err(Error::file(&path, "", message));
         }
         let first = clock.t[0];
+        if let Some((k, _)) = found {
+            let row = |i: usize| clock.keep.as_ref().map_or(i, |keep| keep[i]);
+            let ends = [0, clock.t.len() - 1];
+            stamps.extend(ends.map(|i| table.columns[k][row(i)]));
+        }
         let t: Vec<f64> = clock.t.iter().map(|x| x - first).collect();
         let end = t[t.len() - 1];
         let count = (end / clock.step + 0.1).floor() as usize + 1;
@@ -142,7 +175,7 @@ impl Frame {
                 _ => impossible(&y),
             };
             if let Some(&at) = wrong.first() {
-                let row = clock.keep.as_ref().map_or(at, |r| r[at]) + 1;
+                let row = table.before + clock.keep.as_ref().map_or(at, |r| r[at]) + 1;
                 warnings.push(Warning::new(
                     WarningKind::SamplesLeftOut,
                     format!("{subject}: {}", table.names[k]),
@@ -152,11 +185,6 @@ impl Frame {
             wrong.iter().for_each(|&i| y[i] = f64::NAN);
             let holes = y.iter().filter(|x| !x.is_finite()).count();
             if holes == y.len() {
-                warnings.push(Warning::new(
-                    WarningKind::SamplesLeftOut,
-                    format!("{subject}: {}", table.names[k]),
-                    "it holds no number at all: the channel was not recorded",
-                ));
                 columns.push(vec![0.0; count]);
                 silent.push(k);
                 continue;
@@ -178,7 +206,7 @@ impl Frame {
                 false => interpolate(&t, &y, &grid, Order::Linear),
             });
         }
-        Ok(Frame {
+        let mut frame = Frame {
             paths,
             rows,
             names: table.names,
@@ -187,6 +215,10 @@ impl Frame {
             rate: None,
             time_unit: time_name,
             step,
+            start: 0.0,
+            length: step * (count - 1) as f64,
+            stamps: <[f64; 2]>::try_from(stamps).unwrap_or_default(),
+            factor: to_seconds,
             columns,
             gaps: clock
                 .gaps
@@ -195,7 +227,29 @@ impl Frame {
                 .collect(),
             silent,
             warnings,
-        })
+        };
+        if let Some(rate) = like.and_then(|l| l.rate) {
+            frame.count_by(rate);
+        }
+        Ok(frame)
+    }
+
+    /// What its time is.
+    pub(super) fn ticks(&self) -> Ticks {
+        Ticks {
+            column: self.time,
+            factor: self.factor,
+            rate: self.rate,
+        }
+    }
+
+    /// Counts time by so many samples a second.
+    fn count_by(&mut self, rate: f64) {
+        let longer = 1.0 / (rate * self.step);
+        self.rate = Some(rate);
+        self.step *= longer;
+        self.length *= longer;
+        self.start *= longer;
     }
 
     /// Counts time by so many samples a second, where no column is one.
@@ -205,8 +259,7 @@ impl Frame {
         }
         let message = match rate {
             Some(rate) => {
-                self.rate = Some(rate);
-                self.step = 1.0 / rate;
+                self.count_by(rate);
                 format!(
                     "no column is a time: with {rate} samples a second the velocities are the derivatives of the positions, \
                      and so they were counted; state another time = {{ rate = … }} where it is wrong"
@@ -220,9 +273,28 @@ impl Frame {
         Some(Warning::new(WarningKind::TimeRepaired, subject, message))
     }
 
-    /// Length, s.
+    /// Warnings of the channels that were not recorded.
+    pub(super) fn unrecorded(&self) -> Vec<Warning> {
+        let file = self.paths.first().map_or(String::new(), |p| file_name(p));
+        let warning = |k: &usize| {
+            Warning::new(
+                WarningKind::SamplesLeftOut,
+                format!("{file}: {}", self.names[*k]),
+                "it holds no number at all: the channel was not recorded",
+            )
+        };
+        self.silent.iter().map(warning).collect()
+    }
+
+    /// Length of the record, s.
     pub fn duration(&self) -> f64 {
-        self.step * self.len().saturating_sub(1) as f64
+        self.length
+    }
+
+    /// From and to of its grid, s from the start of the record.
+    pub(super) fn looked_at(&self) -> [f64; 2] {
+        let length = self.step * self.len().saturating_sub(1) as f64;
+        [self.start, self.start + length]
     }
 
     /// What the time is in, in words.
@@ -258,31 +330,37 @@ impl Frame {
     pub(super) fn channel(&self, claims: &[Claim], means: Means, joint: usize) -> Option<Vec<f64>> {
         let k = claims
             .iter()
-            .position(|c| c.means == means && c.at == Some(joint))?;
+            .position(|c| c.means == means && c.at == Some(joint))
+            .filter(|k| !self.silent.contains(k))?;
         let factor = claims[k].factor();
         Some(self.columns.get(k)?.iter().map(|x| x * factor).collect())
     }
 
-    /// What each joint does.
+    /// How far each joint goes in a moment, at the most: what tells motion from noise.
+    pub(super) fn strides(&self, claims: &[Claim], joints: usize) -> Vec<f64> {
+        let of = |j: usize| {
+            let q = self.channel(claims, Means::Position, j);
+            q.map_or(0.0, |q| largest(&travel(&q, moment(&q, self.step))))
+        };
+        (0..joints).into_par_iter().map(of).collect()
+    }
+
+    /// What each joint does; `strides` are those of a part of the record in which it moves, or none.
     pub(super) fn courses(
         &self,
         claims: &[Claim],
         joints: usize,
         robot: Option<&Plant>,
+        strides: &[f64],
     ) -> Vec<Course> {
-        let extent = |y: &[f64]| {
-            y.iter()
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
-                    [a.min(x), b.max(x)]
-                })
-        };
         (0..joints)
             .into_par_iter()
             .map(|j| {
                 let q = self.channel(claims, Means::Position, j);
                 let (moves, fastest) = match &q {
                     Some(q) => {
-                        let moving = still_aware(q, self.step);
+                        let stride = strides.get(j).copied().unwrap_or_default();
+                        let moving = still_aware(q, self.step, stride);
                         let k = ((0.02 / self.step) as usize).max(1);
                         let fastest = (k..q.len())
                             .map(|i| (q[i] - q[i - k]).abs() / (k as f64 * self.step))
@@ -297,7 +375,7 @@ impl Frame {
                 let saturated = clipped.map_or(0, |c| c.count);
                 Course {
                     moves,
-                    range: q.as_deref().map(extent),
+                    range: q.as_deref().map(extremes),
                     fastest,
                     saturated,
                 }
@@ -309,10 +387,7 @@ impl Frame {
 /// The record in which the columns change most, each measured by its largest range in any record.
 pub(super) fn richest(frames: &[Frame]) -> Option<&Frame> {
     let width = |f: &Frame, k: usize| {
-        let values = f.columns.get(k).into_iter().flatten();
-        let [a, b] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
-            [a.min(x), b.max(x)]
-        });
+        let [a, b] = extremes(f.columns.get(k).map_or(&[], Vec::as_slice));
         (b - a).max(0.0)
     };
     let columns = frames.first()?.columns.len();
@@ -358,13 +433,20 @@ fn travel(q: &[f64], k: usize) -> Vec<f64> {
     out
 }
 
+/// Samples of a moment, in which a joint that moves shows that it does.
+fn moment(q: &[f64], step: f64) -> usize {
+    ((0.1 / step) as usize).clamp(2, (q.len() / 4).max(2))
+}
+
+fn largest(travel: &[f64]) -> f64 {
+    travel.iter().copied().fold(0.0, f64::max)
+}
+
 /// Whether a joint moves, sample by sample: by more than a hundredth of its usual speed, and by more than the steps of
-/// its encoder.
-fn still_aware(q: &[f64], step: f64) -> Vec<bool> {
-    let n = q.len();
-    let k = ((0.1 / step) as usize).clamp(2, (n / 4).max(2));
-    let travel = travel(q, k);
-    let largest = travel.iter().copied().fold(0.0, f64::max);
+/// its encoder. `stride` is how far it goes in a moment elsewhere.
+fn still_aware(q: &[f64], step: f64, stride: f64) -> Vec<bool> {
+    let travel = travel(q, moment(q, step));
+    let largest = largest(&travel).max(stride);
     let noise = median(
         q.windows(2)
             .map(|w| (w[1] - w[0]).abs())
@@ -376,6 +458,9 @@ fn still_aware(q: &[f64], step: f64) -> Vec<bool> {
     travel.iter().map(|x| *x > least).collect()
 }
 
+/// A joint that stands for less has not stopped, s.
+pub(super) const PAUSE: f64 = 0.3;
+
 /// Runs of `true` as times; those shorter than a tenth of a second are left out.
 fn intervals(moving: &[bool], step: f64) -> Vec<[f64; 2]> {
     let mut out: Vec<[f64; 2]> = Vec::new();
@@ -386,7 +471,7 @@ fn intervals(moving: &[bool], step: f64) -> Vec<[f64; 2]> {
             (false, Some(f)) => {
                 let [a, b] = [f as f64 * step, (i - 1) as f64 * step];
                 match out.last_mut() {
-                    Some(last) if a - last[1] < 0.3 => last[1] = b,
+                    Some(last) if a - last[1] < PAUSE => last[1] = b,
                     _ if b - a >= 0.1 => out.push([a, b]),
                     _ => {}
                 }

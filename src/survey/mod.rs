@@ -18,6 +18,7 @@ mod families;
 mod frame;
 pub mod json;
 mod kinematics;
+mod long;
 mod own;
 pub mod page;
 mod search;
@@ -62,8 +63,36 @@ pub struct Survey {
 /// # Errors
 /// Files that cannot be read, or hold nothing that can be sampled signals.
 pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
+    survey_in_parts(files, robot, None)
+}
+
+/// The same of one file in parts of so many rows, of which a few are held, where 0 reads it whole; [`survey`] reads it in
+/// parts where it is long. Text and bags come in parts; several files are held as a whole. What the columns mean is found in the
+/// part in which they change most; what the joints do, gaps and what is wrong are of all.
+///
+/// # Errors
+/// As [`survey`].
+pub fn survey_in_parts(
+    files: &[PathBuf],
+    robot: Option<&Plant>,
+    rows: Option<usize>,
+) -> Result<Survey> {
+    let (mut frames, mut warnings) = (Vec::new(), Vec::new());
+    let (mut format, mut topic) = (Format::Csv, None);
+    let long = match files {
+        [path] => match rows.map_or_else(|| long::rows(path), Ok)? {
+            0 => None,
+            rows => long::liveliest(path, rows, &mut warnings)?,
+        },
+        _ => None,
+    };
+    let each = long.as_ref().map(|part| part.rows);
+    if let Some(part) = long {
+        (format, topic) = (part.format, part.topic);
+        frames.push(part.frame);
+    }
     let mut parts = Vec::new();
-    for path in files {
+    for path in files.iter().filter(|_| each.is_none()) {
         let request = Request {
             skip: None,
             format: None,
@@ -73,26 +102,24 @@ pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
         parts.push((path.clone(), formats::read(path, &request)?));
     }
     merge::call_by_files(&mut parts);
-    let topic = parts.iter().find_map(|(_, r)| r.topic.clone());
+    topic = topic.or_else(|| parts.iter().find_map(|(_, r)| r.topic.clone()));
     let same = parts
         .windows(2)
         .all(|w| w[0].1.table.names == w[1].1.table.names);
-    let mut warnings = Vec::new();
-    let mut frames = Vec::new();
-    let format;
     if same {
-        format = parts.first().map_or(Format::Csv, |(_, r)| r.format);
+        format = parts.first().map_or(format, |(_, r)| r.format);
         for (path, read) in parts {
-            frames.push(Frame::new(vec![path], read.table, format)?);
+            frames.push(Frame::new(vec![path], read.table, format, None)?);
         }
     } else {
         let paths: Vec<PathBuf> = parts.iter().map(|(p, _)| p.clone()).collect();
         let (table, kind) = merge::merge(parts)?;
         format = kind;
-        frames.push(Frame::new(paths, table, format)?);
+        frames.push(Frame::new(paths, table, format, None)?);
     }
     for f in &mut frames {
         warnings.append(&mut f.warnings);
+        warnings.extend(f.unrecorded());
     }
     let mut claims = stated::claims(&frames, format, robot, &mut warnings);
     let rate = kinematics::rate(&frames, &claims);
@@ -111,10 +138,16 @@ pub fn survey(files: &[PathBuf], robot: Option<&Plant>) -> Result<Survey> {
         Some(plant) => plant.actuators().iter().map(|j| j.name.clone()).collect(),
         None => stated::joints(&claims),
     };
-    let courses = frames
-        .iter()
-        .map(|f| f.courses(&claims, joints.len(), robot))
-        .collect();
+    let courses = match (&frames[..], each) {
+        ([part], Some(rows)) => {
+            let n = joints.len();
+            vec![long::courses(part, (format, rows), &claims, n, robot)?]
+        }
+        _ => {
+            let courses = |f: &Frame| f.courses(&claims, joints.len(), robot, &[]);
+            frames.iter().map(courses).collect()
+        }
+    };
     Ok(Survey {
         format,
         topic,

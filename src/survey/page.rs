@@ -169,7 +169,7 @@ fn panel(
             (0..y.len())
                 .step_by(each)
                 .map(|i| {
-                    let t = i as f64 * frame.step;
+                    let t = frame.start + i as f64 * frame.step;
                     [t, if moving(t) == on { y[i] } else { f64::NAN }]
                 })
                 .collect()
@@ -180,6 +180,7 @@ fn panel(
     let rules = frame
         .gaps
         .iter()
+        .filter(|g| g[0] >= frame.looked_at()[0] && g[0] <= frame.looked_at()[1])
         .take(50)
         .map(|g| Rule {
             at: g[0],
@@ -190,7 +191,7 @@ fn panel(
         .collect();
     Panel {
         x: Axis {
-            range: Some([0.0, frame.duration()]),
+            range: Some(frame.looked_at()),
             ..Axis::linear("time, s")
         },
         y: Axis::linear(label.split(',').next().unwrap_or(label)),

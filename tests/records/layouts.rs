@@ -2,7 +2,7 @@
 
 use super::blind::simulated;
 use excite::Plant;
-use excite::survey::{Means, Survey, survey};
+use excite::survey::{Means, Survey, survey, survey_in_parts};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -397,4 +397,94 @@ fn a_counter_is_no_time() {
         vec![(m.t[i] as i64).to_string(), m.t[i].to_string()]
     });
     assert_eq!(of_two, ("timestamp".into(), "s"));
+}
+
+/// A log that is read in parts: it begins with a robot that stands, has a gap, a value that nothing can have measured, and a
+/// channel that was not recorded. What its parts say together is what it says as a whole.
+#[test]
+fn a_log_in_parts_says_what_it_says_as_a_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let m = Motion::new();
+    let n = m.t.len();
+    let step = m.t[1] - m.t[0];
+    let head = n / 4;
+    let noise =
+        |i: usize, j: usize| 1e-6 * (((i * 7919 + j * 104_729) % 1000) as f64 - 500.0) / 500.0;
+    let (gap, wrong) = (n / 2, head + 2 * n / 3);
+    for timed in [true, false] {
+        let cells = |i: usize| {
+            let at = i.saturating_sub(head);
+            let stands = i < head;
+            let t = i as f64 * step + if i >= gap { 3.0 } else { 0.0 };
+            let mut cells = vec![t.to_string()];
+            for (columns, scale) in [(&m.q, 1.0), (&m.dq, 0.0), (&m.tau, 1.0)] {
+                for (j, column) in columns.iter().enumerate() {
+                    let x = match stands {
+                        true => scale * column[0] + noise(i, j),
+                        false => column[at],
+                    };
+                    cells.push(x.to_string());
+                }
+            }
+            if i == wrong {
+                cells[2] = "4.5e7".into();
+            }
+            cells.push("nan".into());
+            if !timed {
+                cells.remove(0);
+            }
+            cells
+        };
+        let names = ["q", "dq", "tau"].map(|name| numbered(name, 1)).join(",");
+        let mut text = format!("{}{names},spare\n", if timed { "t," } else { "" });
+        for i in 0..head + n {
+            let _ = writeln!(text, "{}", cells(i).join(","));
+        }
+        let path = dir.path().join("long.csv");
+        std::fs::write(&path, text).unwrap();
+        let read = |rows| survey_in_parts(&[path.clone()], Some(&m.plant), Some(rows)).unwrap();
+        let whole = read(0);
+        for rows in [n / 6, n / 3] {
+            let parts = read(rows);
+            let [a, b] = [&whole, &parts].map(|s| &s.frames[0]);
+            assert_eq!((a.rows, a.time_unit), (b.rows, b.time_unit));
+            assert!((a.duration() - b.duration()).abs() < 2.0 * step, "{timed}");
+            assert_eq!(a.gaps.len(), usize::from(timed));
+            assert_eq!(a.gaps.len(), b.gaps.len());
+            let pairs = a.gaps.iter().flatten().zip(b.gaps.iter().flatten());
+            assert!(pairs.into_iter().all(|(x, y)| (x - y).abs() < 2.0 * step));
+            for (c, d) in whole.claims.iter().zip(&parts.claims) {
+                assert_eq!(
+                    (&c.column, c.means, &c.joint),
+                    (&d.column, d.means, &d.joint)
+                );
+                assert!((c.factor() / d.factor() - 1.0).abs() < 1e-6, "{}", c.column);
+            }
+            for (c, d) in whole.courses[0].iter().zip(&parts.courses[0]) {
+                assert_eq!(c.saturated, d.saturated);
+                let ends = c.range.iter().flatten().zip(d.range.iter().flatten());
+                assert!(ends.into_iter().all(|(x, y)| (x - y).abs() < 1e-9));
+                assert_eq!(c.moves.len(), d.moves.len(), "{:?} {:?}", c.moves, d.moves);
+                let pairs = c.moves.iter().flatten().zip(d.moves.iter().flatten());
+                assert!(pairs.into_iter().all(|(x, y)| (x - y).abs() < 0.2));
+                // it stands at first
+                assert!(d.moves[0][0] > (head as f64 - 1.0) * step - 0.2);
+                let relative = d.fastest.unwrap() / c.fastest.unwrap();
+                assert!((relative - 1.0).abs() < 1e-3, "{relative}");
+            }
+            let said = |s: &Survey, what: &str| -> Vec<String> {
+                let all = s.warnings.iter().map(ToString::to_string);
+                all.filter(|w| w.contains(what)).collect()
+            };
+            for what in ["no number at all", "cannot have been measured"] {
+                assert_eq!(said(&parts, what).len(), 1, "{:?}", parts.warnings);
+                assert_eq!(said(&parts, what), said(&whole, what));
+            }
+            let row = format!("row {} ", wrong + 1);
+            assert!(said(&parts, "cannot have been")[0].contains(&row), "{row}");
+            assert_eq!(said(&parts, "read in parts").len(), 1);
+        }
+    }
+    let few = survey_in_parts(&[dir.path().join("long.csv")], None, Some(5)).unwrap_err();
+    assert!(few.to_string().contains("64"), "{few}");
 }

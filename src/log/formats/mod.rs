@@ -186,13 +186,13 @@ pub(crate) fn divides(path: &Path) -> Result<bool> {
 }
 
 /// Reads text or a bag in parts of `rows` rows, and hands each to `each`; the last has half as many at least and up to
-/// half as many again. Files of arrays come as a whole.
+/// half as many again. Files of arrays come as a whole. Returns the topic of a bag.
 pub(crate) fn read_parts(
     path: &Path,
     request: &Request,
     rows: usize,
     each: &mut dyn FnMut(Table, Format) -> Result<ControlFlow<()>>,
-) -> Result<()> {
+) -> Result<Option<String>> {
     let found = format_of(path, request)?;
     if found.text() {
         let text = |table: Table, each: &mut dyn FnMut(Table, Format) -> _| {
@@ -218,16 +218,18 @@ pub(crate) fn read_parts(
         if !enough && !last.columns.iter().all(Vec::is_empty) {
             let _ = text(last, each)?;
         }
-        return Ok(());
+        return Ok(None);
     }
     if !matches!(found, Format::Db3 | Format::Mcap) {
         let whole = read(path, request)?;
         let _ = each(whole.table, whole.format)?;
-        return Ok(());
+        return Ok(whole.topic);
     }
     let mut held = Table::default();
     let mut enough = false;
-    let mut take = |table: Table, _: &str| {
+    let mut topic = None;
+    let mut take = |table: Table, name: &str| {
+        topic.get_or_insert_with(|| name.to_string());
         bag::append(&mut held, table, path)?;
         while held.rows() >= rows + rows / 2 && !enough {
             let mut part = csv::first_rows(&mut held, rows);
@@ -245,7 +247,7 @@ pub(crate) fn read_parts(
     if !enough {
         let _ = each(held, found)?;
     }
-    Ok(())
+    Ok(topic)
 }
 
 /// The files of a bag: itself, or those of its folder by name.

@@ -124,10 +124,7 @@ impl Record {
         rows: usize,
         each: &mut dyn FnMut(Record) -> Result<ControlFlow<()>>,
     ) -> Result<()> {
-        if rows < LEAST {
-            let message = format!("parts of {rows} rows are too short; take {LEAST} or more");
-            return Err(Error::Argument(message));
-        }
+        long_enough(rows)?;
         let [path] = paths else {
             return each(Self::read_as(paths, plant, purpose, period, reading)?).map(|_| ());
         };
@@ -210,6 +207,17 @@ impl Record {
 
 /// Rows of a part at least.
 const LEAST: usize = 64;
+
+/// Whether parts of so many rows can be looked at.
+pub(crate) fn long_enough(rows: usize) -> Result<()> {
+    match rows < LEAST {
+        true => {
+            let message = format!("parts of {rows} rows are too short; take {LEAST} or more");
+            Err(Error::Argument(message))
+        }
+        false => Ok(()),
+    }
+}
 
 /// What a part of a log has of the part of the record that counts.
 enum Cut {
