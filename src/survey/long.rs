@@ -33,14 +33,14 @@ pub(super) struct Part {
     pub rows: usize,
 }
 
-/// Hands the parts of a log to `each`, with when they begin, s from its start; returns the topic of a bag, and nothing where
-/// parts have other columns than the first.
+/// Hands the parts of a log to `each`, with when they begin, s from its start; returns the topic of a bag and what is said of
+/// parts that cannot be looked at, and nothing where parts have other columns than the first.
 fn follow(
     path: &Path,
     rows: usize,
     like: Option<(Ticks, Format)>,
     each: &mut dyn FnMut(Frame, Format) -> Result<()>,
-) -> Result<Option<Option<String>>> {
+) -> Result<Option<(Option<String>, Vec<Warning>)>> {
     let request = Request {
         skip: None,
         format: like.map(|(_, format)| format),
@@ -51,13 +51,29 @@ fn follow(
     let mut before: Option<[f64; 3]> = None;
     let mut names: Option<Vec<String>> = None;
     let mut ticks = like.map(|(ticks, _)| ticks);
+    let (mut hopeless, mut why) = (Vec::new(), None);
     let mut alike = true;
     let topic = formats::read_parts(path, &request, rows, &mut |table, format| {
         alike = *names.get_or_insert_with(|| table.names.clone()) == table.names;
         if !alike {
             return Ok(ControlFlow::Break(()));
         }
-        let mut frame = Frame::new(vec![path.to_path_buf()], table, format, ticks)?;
+        let first = table.before + 1;
+        let last = table.before + table.rows();
+        let mut frame = match Frame::new(vec![path.to_path_buf()], table, format, ticks) {
+            Ok(frame) => frame,
+            // as hopeless rows of a log that is read whole
+            Err(e) => {
+                let said = format!("rows {first} to {last} were left out: {e}");
+                hopeless.push(Warning::new(
+                    WarningKind::RowsLeftOut,
+                    super::file_name(path),
+                    said,
+                ));
+                why.get_or_insert(e);
+                return Ok(ControlFlow::Continue(()));
+            }
+        };
         ticks.get_or_insert_with(|| frame.ticks());
         if let Some([end, last, step]) = before {
             let ahead = match frame.time {
@@ -80,7 +96,10 @@ fn follow(
         each(frame, format)?;
         Ok(ControlFlow::Continue(()))
     })?;
-    Ok(alike.then_some(topic))
+    if let (None, Some(e)) = (before, why) {
+        return Err(e);
+    }
+    Ok(alike.then_some((topic, hopeless)))
 }
 
 /// Rows of the parts of a log, if it is so long that it should be read in parts, else 0.
@@ -119,7 +138,7 @@ pub(super) fn liveliest(
     let (mut rows, mut length, mut gaps, mut said) = (0, 0.0, Vec::new(), Vec::new());
     let mut silent: Option<Vec<usize>> = None;
     let mut kind = Format::Csv;
-    let topic = follow(path, each, None, &mut |mut frame, format| {
+    let found = follow(path, each, None, &mut |mut frame, format| {
         kind = format;
         rows += frame.rows;
         length = frame.looked_at()[1];
@@ -139,10 +158,11 @@ pub(super) fn liveliest(
         });
         Ok(())
     })?;
-    let (Some(topic), Some(mut frame)) = (topic, best) else {
+    let (Some((topic, hopeless)), Some(mut frame)) = (found, best) else {
         return Ok(None);
     };
     warnings.append(&mut said);
+    warnings.extend(hopeless);
     let [from, to] = frame.looked_at();
     if frame.rows < rows {
         let seconds = match frame.time {

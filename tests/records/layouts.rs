@@ -442,7 +442,8 @@ fn a_log_in_parts_says_what_it_says_as_a_whole() {
         }
         let path = dir.path().join("long.csv");
         std::fs::write(&path, text).unwrap();
-        let read = |rows| survey_in_parts(&[path.clone()], Some(&m.plant), Some(rows)).unwrap();
+        let files = [path];
+        let read = |rows| survey_in_parts(&files, Some(&m.plant), Some(rows)).unwrap();
         let whole = read(0);
         for rows in [n / 6, n / 3] {
             let parts = read(rows);
@@ -487,4 +488,33 @@ fn a_log_in_parts_says_what_it_says_as_a_whole() {
     }
     let few = survey_in_parts(&[dir.path().join("long.csv")], None, Some(5)).unwrap_err();
     assert!(few.to_string().contains("64"), "{few}");
+}
+
+/// A clock that stands still for a part of a log costs the rows of that part, and not the log.
+#[test]
+fn a_part_of_a_log_without_a_clock_is_left_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let m = Motion::new();
+    let path = dir.path().join("long.csv");
+    let stopped = 400..800;
+    m.write(&path, &format!("t,{}", numbered("q", 1)), &|i| {
+        let last = if stopped.contains(&i) {
+            stopped.start - 1
+        } else {
+            i
+        };
+        row(vec![m.t[last].to_string()], i, &[&m.q])
+    });
+    let found = survey_in_parts(&[path], None, Some(200)).unwrap();
+    let frame = &found.frames[0];
+    assert_eq!(frame.rows, m.t.len() - stopped.len());
+    assert!((frame.duration() - m.t[m.t.len() - 1]).abs() < 0.1);
+    assert_eq!(frame.gaps.len(), 1, "{:?}", frame.gaps);
+    let said: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+    for rows in ["rows 401 to 600", "rows 601 to 800"] {
+        assert!(said.iter().any(|w| w.contains(rows)), "{said:?}");
+    }
+    let all = dir.path().join("stopped.csv");
+    m.write(&all, "t,q1", &|i| vec!["7".into(), m.q[0][i].to_string()]);
+    assert!(survey_in_parts(&[all], None, Some(200)).is_err());
 }
