@@ -40,7 +40,11 @@ const SHORTEST: usize = 5;
 /// counts are runs of at least five samples, four times as long as usual in this channel, that
 /// make up at least 0.1 % of the record; or any such run at the effort limit.
 pub fn saturated(y: &[f64], effort: f64) -> Option<Clipped> {
-    let [low, high] = extremes(y);
+    saturated_within(y, extremes(y), effort)
+}
+
+/// The same of a channel whose smallest and largest values are known.
+pub(super) fn saturated_within(y: &[f64], [low, high]: [f64; 2], effort: f64) -> Option<Clipped> {
     if high <= low || !(high - low).is_finite() {
         return None;
     }
@@ -150,9 +154,8 @@ pub struct Moving<'a> {
 }
 
 impl<'a> Moving<'a> {
-    /// Of a channel with this time between its samples, s.
-    pub fn new(y: &'a [f64], step: f64) -> Self {
-        let [low, high] = extremes(y);
+    /// Of a channel with its smallest and largest value, and this time between its samples, s.
+    pub fn new(y: &'a [f64], [low, high]: [f64; 2], step: f64) -> Self {
         Moving {
             y,
             reach: ((0.025 / step) as usize).max(2),
@@ -176,9 +179,8 @@ impl<'a> Moving<'a> {
     }
 }
 
-/// What the range of a joint's positions says about their unit, if anything.
-pub fn position_unit(joint: &Joint, q: &[f64]) -> Option<Warning> {
-    let [low, high] = extremes(q);
+/// What the smallest and largest position of a joint say about their unit, if anything.
+pub fn position_unit(joint: &Joint, [low, high]: [f64; 2]) -> Option<Warning> {
     let limits = joint.limits.position;
     let span = limits[1] - limits[0];
     let fits = |scale: f64| {

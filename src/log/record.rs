@@ -256,9 +256,9 @@ impl Record {
         });
         drop(table);
 
-        record.drop_impossible(&clock);
-        record.fill_dropped(&clock)?;
-        record.check_channels(&joints)?;
+        let mut ends = record.drop_impossible(&clock);
+        record.fill_dropped(&clock, &mut ends)?;
+        record.check_channels(&joints, &ends)?;
         let duration = clock.t[clock.t.len() - 1] - clock.t[0];
         record.drop_wrong_period(clock.step, duration);
         Ok((record, clock))

@@ -43,21 +43,32 @@ fn noise_floor(f: &[f64], density: &[f64], rate: f64) -> f64 {
         .filter(|(f, _)| (0.3 * rate..0.45 * rate).contains(f))
         .map(|(_, d)| *d)
         .collect();
-    high.sort_by(f64::total_cmp);
-    high.get(high.len() / 2).copied().unwrap_or(0.0) / std::f64::consts::LN_2
+    if high.is_empty() {
+        return 0.0;
+    }
+    let middle = high.len() / 2;
+    *high.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2
 }
 
 /// Spectra of positions of one length, of which no more than so many windows are looked at.
 pub struct Spectra {
     welch: Welch,
     rate: f64,
+    /// what the difference does to each line
+    gain: Vec<f64>,
 }
 
 impl Spectra {
     /// Of positions of `count` samples, with windows of `length`.
     pub fn new(count: usize, rate: f64, length: usize, windows: usize) -> Self {
+        let welch = Welch::new(count.saturating_sub(1), length, windows);
+        let gain = |f: f64| {
+            let gain = 2.0 * (PI * f / rate).sin();
+            (gain * gain).max(1e-300)
+        };
         Spectra {
-            welch: Welch::new(count.saturating_sub(1), length, windows),
+            gain: welch.frequencies(rate).into_iter().map(gain).collect(),
+            welch,
             rate,
         }
     }
@@ -82,10 +93,10 @@ impl Spectra {
             to.iter_mut().zip(pairs).for_each(|(d, q)| *d = q[1] - q[0]);
         };
         let (f, mut density) = self.welch.density(self.rate, put);
-        for (f, d) in f.iter().zip(&mut density) {
-            let gain = 2.0 * (PI * f / self.rate).sin();
-            *d /= (gain * gain).max(1e-300);
-        }
+        density
+            .iter_mut()
+            .zip(&self.gain)
+            .for_each(|(d, gain)| *d /= gain);
         density[0] = 0.0;
         (f, density)
     }

@@ -154,7 +154,13 @@ impl Welch {
             }
         }
         let scale = 2.0 / (rate * power * self.starts.len().max(1) as f64);
-        let frequencies = (0..bins).map(|k| k as f64 * rate / n as f64).collect();
-        (frequencies, sum.into_iter().map(|s| s * scale).collect())
+        let density = sum.into_iter().map(|s| s * scale).collect();
+        (self.frequencies(rate), density)
+    }
+
+    /// Frequencies of the lines.
+    pub(super) fn frequencies(&self, rate: f64) -> Vec<f64> {
+        let n = self.window.len();
+        (0..n / 2 + 1).map(|k| k as f64 * rate / n as f64).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! What is wrong with the channels of a log: dropped, stuck and saturated values, units, periods.
 
 use crate::error::{Error, Result, Warning, WarningKind, agreeing, counted};
-use crate::extremes::all_finite;
+use crate::extremes::{all_finite, extremes};
 use crate::log::Record;
 use crate::log::channels::{self, Moving};
 use crate::log::clock::Clock;
@@ -20,8 +20,8 @@ const LONGEST: f64 = 1e3;
 const ENDS: f64 = 0.2;
 
 impl Record {
-    /// Interpolates dropped values, marks them, and names their channels.
-    pub(super) fn fill_dropped(&mut self, clock: &Clock) -> Result<()> {
+    /// Interpolates dropped values, marks them, and names their channels; `extent` holds the smallest and largest value of each.
+    pub(super) fn fill_dropped(&mut self, clock: &Clock, extent: &mut [[f64; 2]]) -> Result<()> {
         let path = self.path.clone();
         let mut valid = std::mem::take(&mut self.valid);
         let (mut warnings, mut ends, mut missing) = (Vec::new(), Vec::new(), 0);
@@ -31,7 +31,7 @@ impl Record {
             false => (0..y.len()).filter(|&i| !y[i].is_finite()).collect(),
         };
         let all: Vec<Vec<usize>> = channels.par_iter().map(|(.., c)| holes(c)).collect();
-        for ((name, order, column), holes) in channels.into_iter().zip(all) {
+        for (((name, order, column), holes), extent) in channels.into_iter().zip(all).zip(extent) {
             let Some(&first) = holes.first() else {
                 continue;
             };
@@ -40,6 +40,7 @@ impl Record {
                 return Err(Error::file(&path, format!("column {name}"), message));
             }
             fill(&clock.t, column, order);
+            *extent = extremes(column);
             for &i in &holes {
                 valid[i] = false;
             }
@@ -83,11 +84,15 @@ impl Record {
         Ok(())
     }
 
-    /// Looks for saturated and stuck channels, joints that do not move, and other units.
-    pub(super) fn check_channels(&mut self, joints: &[&Joint]) -> Result<()> {
+    /// Looks for saturated and stuck channels, joints that do not move, and other units; with the smallest and largest value of
+    /// each channel.
+    pub(super) fn check_channels(&mut self, joints: &[&Joint], ends: &[[f64; 2]]) -> Result<()> {
+        let ends = ends.split_at(self.q.len().min(ends.len()));
         let subject = self.path.display().to_string();
         let step = self.step;
-        let moving: Vec<Moving> = self.q.par_iter().map(|q| Moving::new(q, step)).collect();
+        let with_ends = self.q.iter().zip(ends.0);
+        let moving = with_ends.map(|(q, ends)| Moving::new(q, *ends, step));
+        let moving: Vec<Moving> = moving.collect();
         let still: Vec<usize> = (0..joints.len()).filter(|&j| !moving[j].ever()).collect();
         if still.len() == joints.len() {
             return Err(Error::file(
@@ -106,7 +111,7 @@ impl Record {
                 ),
             ));
         }
-        let check = |(j, joint): (usize, &&Joint)| self.check_actuator(j, joint, &moving);
+        let check = |(j, joint): (usize, &&Joint)| self.check_actuator(j, joint, &moving, ends);
         let found: Vec<(Vec<Warning>, Vec<Range<usize>>)> =
             joints.par_iter().enumerate().map(check).collect();
         for (warnings, out) in found {
@@ -130,20 +135,24 @@ impl Record {
         Ok(())
     }
 
-    /// What is wrong with the channels of actuator `j`, and which samples are left out for it; `moving` says when each moves.
+    /// What is wrong with the channels of actuator `j`, and which samples are left out for it; `moving` says when each moves, and `ends` hold
+    /// the smallest and largest value of the positions and of the torques.
     fn check_actuator(
         &self,
         j: usize,
         joint: &Joint,
         moving: &[Moving],
+        ends: (&[[f64; 2]], &[[f64; 2]]),
     ) -> (Vec<Warning>, Vec<Range<usize>>) {
         let subject = self.path.display();
         let (q, step) = (&self.q[j], self.step);
-        let mut warnings: Vec<Warning> = channels::position_unit(joint, q).into_iter().collect();
+        let mut warnings: Vec<Warning> = channels::position_unit(joint, ends.0[j])
+            .into_iter()
+            .collect();
         let mut out = Vec::new();
         if let Some(tau) = self.tau.get(j) {
             let name = format!("{subject}: tau{}", j + 1);
-            if let Some(clipped) = channels::saturated(tau, joint.limits.effort) {
+            if let Some(clipped) = channels::saturated_within(tau, ends.1[j], joint.limits.effort) {
                 let message = format!(
                     "it stands at {:.6} for {} samples as a saturated channel does; they were left out of the fit",
                     clipped.level, clipped.count

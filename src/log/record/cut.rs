@@ -77,8 +77,7 @@ impl Record {
 
 /// Whether it shows without any sorting that no sample is far: where more than a hundredth of them lie in the lowest
 /// quarter of the range, and as many in the highest, the middle 98 % are at least half the range wide.
-fn none_is_far(y: &[f64]) -> bool {
-    let [low, high] = extremes(y);
+fn none_is_far(y: &[f64], [low, high]: [f64; 2]) -> bool {
     if low < -LARGEST || high > LARGEST {
         return false;
     }
@@ -97,7 +96,12 @@ fn none_is_far(y: &[f64]) -> bool {
 
 /// Samples of a channel that cannot have been measured: far from everything else, alone or a few in a row.
 pub(crate) fn impossible(y: &[f64]) -> Vec<usize> {
-    match y.len() >= FEW && none_is_far(y) {
+    impossible_within(y, extremes(y))
+}
+
+/// The same of one whose smallest and largest finite values are known.
+fn impossible_within(y: &[f64], ends: [f64; 2]) -> Vec<usize> {
+    match y.len() >= FEW && none_is_far(y, ends) {
         true => Vec::new(),
         false => far_ones(y),
     }
@@ -135,13 +139,19 @@ fn far_ones(y: &[f64]) -> Vec<usize> {
 }
 
 impl Record {
-    /// Takes impossible values out, so that they count as dropped; names them with their rows.
-    pub(super) fn drop_impossible(&mut self, clock: &Clock) {
+    /// Takes impossible values out, so that they count as dropped; names them with their rows. Returns the smallest and largest
+    /// finite value of each channel.
+    pub(super) fn drop_impossible(&mut self, clock: &Clock) -> Vec<[f64; 2]> {
         let path = self.path.display().to_string();
         let mut warnings = Vec::new();
         let channels = self.channels();
-        let all: Vec<Vec<usize>> = channels.par_iter().map(|(.., c)| impossible(c)).collect();
-        for ((name, _, column), wrong) in channels.into_iter().zip(all) {
+        let look = |y: &[f64]| {
+            let ends = extremes(y);
+            (impossible_within(y, ends), ends)
+        };
+        let (all, mut ends): (Vec<Vec<usize>>, Vec<[f64; 2]>) =
+            channels.par_iter().map(|(.., c)| look(c)).unzip();
+        for (((name, _, column), wrong), ends) in channels.into_iter().zip(all).zip(&mut ends) {
             let Some(&first) = wrong.first() else {
                 continue;
             };
@@ -150,6 +160,7 @@ impl Record {
             for &i in &wrong {
                 column[i] = f64::NAN;
             }
+            *ends = extremes(column);
             warnings.push(Warning::new(
                 WarningKind::SamplesLeftOut,
                 format!("{path}: {name}"),
@@ -157,6 +168,7 @@ impl Record {
             ));
         }
         self.warnings.extend(warnings);
+        ends
     }
 }
 
@@ -188,7 +200,7 @@ mod tests {
             }
             let expected = far_ones(&y);
             assert_eq!(impossible(&y), expected, "case {case}");
-            quick += usize::from(none_is_far(&y));
+            quick += usize::from(none_is_far(&y, extremes(&y)));
             found += usize::from(!expected.is_empty());
         }
         assert!(
