@@ -98,6 +98,7 @@ fn frame(record: &Record, plant: &Plant) -> (Frame, Vec<Claim>) {
                 joint: Some(joint.name.clone()),
                 confidence: 0.8,
                 evidence: "its name".into(),
+                named: true,
                 ..Claim::none(&name)
             });
             frame.names.push(name);

@@ -40,6 +40,12 @@ pub struct Claim {
     /// whether its name is that of something else than a joint has, or of a command that is no position
     #[serde(skip)]
     pub of_no_joint: bool,
+    /// whether its name says what it is
+    #[serde(skip)]
+    pub named: bool,
+    /// whether the gain of a current is the middle of those of other joints
+    #[serde(skip)]
+    pub gain_of_others: bool,
     /// name of the joint
     pub joint: Option<String>,
     /// 1 or -1
@@ -73,6 +79,8 @@ impl Claim {
             at: None,
             of: None,
             of_no_joint: names::of_no_joint(column),
+            named: false,
+            gain_of_others: false,
             joint: None,
             sign: 1.0,
             sign_known: true,

@@ -176,6 +176,7 @@ fn others(claims: &mut [Claim], torques: &[usize], told: &[usize]) {
         }
         c.scale = gain;
         c.confidence = c.confidence.min(0.6);
+        c.gain_of_others = true;
         c.evidence += OF_OTHERS;
     }
 }

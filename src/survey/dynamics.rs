@@ -174,7 +174,7 @@ fn look(
     let limited = slow(best);
     let rival = |h: &Hypothesis| allowed(h) && (!limited || slow(h));
     let verdict = Verdict::of(&problem, best, &found, &rival, n);
-    let trusted = stated_all && claims.iter().any(|c| c.evidence.contains("its name"));
+    let trusted = stated_all && claims.iter().any(|c| c.named);
     let mut ws = Workspace::default();
     // columns of torques, once the positions have their joints
     let torques_too =

@@ -1,7 +1,6 @@
 //! The `experiment.toml` of a survey, with every decision in it.
 
 use super::claim::{Claim, Means};
-use super::families::OF_OTHERS;
 use super::frame::{Course, Frame};
 use super::{Survey, file_name};
 use crate::log::formats::detect;
@@ -289,7 +288,7 @@ fn group(out: &mut String, survey: &Survey, key: &str, means: Means) {
     let least = found.iter().map(|(_, c)| c.confidence).fold(1.0, f64::min);
     let others: Vec<&str> = found
         .iter()
-        .filter(|(_, c)| c.evidence.contains(OF_OTHERS))
+        .filter(|(_, c)| c.gain_of_others)
         .filter_map(|(_, c)| c.joint.as_deref())
         .collect();
     let note = match means {

@@ -123,6 +123,7 @@ pub(super) fn families(
             claims[k].confidence = usual[j].confidence.min(confidence);
             claims[k].at = Some(j);
             claims[k].joint = Some(joints[j].name.clone());
+            claims[k].gain_of_others = gains[c].is_none() && !gain.torque;
             claims[k].evidence = format!(
                 "{:.0} % of it is the torque of {} with friction, {:.0} % of the rest of it that of the model's bodies{}{}",
                 100.0 * m.share,

@@ -72,6 +72,7 @@ pub(super) fn claims(
             };
             claim.commands = (quantity == Quantity::Command).then_some("position");
             claim.evidence = "its name".into();
+            claim.named = true;
             claim.confidence = confidence;
             if let Some((unit, factor)) = name.unit.and_then(names::unit) {
                 claim.unit = Some(unit);

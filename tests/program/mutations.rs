@@ -207,6 +207,7 @@ const TARGETS: [(&str, &[&str]); 31] = [
 const FOREIGN: &[&str] = &[
     "log FILE --output o --force",
     "log FILE --robot arm.toml --output o --force",
+    "log FILE --robot arm.toml --rows 64 --output o --force",
     "condense FILE --robot arm.toml --cutoff 10 --output c.factor --force",
 ];
 
