@@ -151,6 +151,10 @@ pub trait Effect: Sync {
     fn late(&self) -> bool {
         false
     }
+    /// Whether it may be believed where it explains a part of the gap on its joints only, and nothing else comes near that part.
+    fn of_a_part(&self, _shape: &Shape) -> bool {
+        true
+    }
     /// Whether it rings with damping, as the loop of the robot's controller does.
     fn rings(&self, _shape: &Shape) -> bool {
         false

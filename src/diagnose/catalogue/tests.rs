@@ -418,3 +418,15 @@ fn a_spring_has_its_sign() {
     }
     assert!((spring.values(&cx, &estimate)[0].value - k).abs() < 1e-9);
 }
+
+/// Torque ahead of the positions is the one effect that must explain most of a gap: many others leave something like it.
+#[test]
+fn only_torque_that_is_ahead_may_not_explain_a_part() {
+    for effect in all() {
+        let delay = effect.card().name == "torque_delay";
+        for sign in [-1.0, 1.0] {
+            let shape = Shape::of(&[0.004 * sign]);
+            assert_eq!(effect.of_a_part(&shape), !delay || sign > 0.0);
+        }
+    }
+}

@@ -42,6 +42,12 @@ impl Effect for TorqueDelay {
         true
     }
 
+    /// A torque that comes late leaves a gap that it explains. One ahead of the positions is close to what many effects leave in
+    /// part: soft friction that reverses early, a wheel that runs out of true, an elastic gear.
+    fn of_a_part(&self, shape: &Shape) -> bool {
+        shape[0] > 0.0
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         Some(Element::Delay {
             joints: e.place.actuators(cx.data.joints()),
