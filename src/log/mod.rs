@@ -23,7 +23,7 @@ pub(crate) mod layout;
 pub(crate) mod merge;
 pub(crate) mod names;
 pub(crate) mod number;
-mod outline;
+pub(crate) mod outline;
 pub mod parts;
 pub(crate) mod place;
 mod pose_check;

@@ -323,7 +323,7 @@ impl Outline {
 }
 
 /// Bytes of a file, or of the files of a folder.
-fn size(path: &Path) -> u64 {
+pub(crate) fn size(path: &Path) -> u64 {
     let of = |p: &Path| std::fs::metadata(p).map_or(0, |m| m.len());
     match std::fs::read_dir(path) {
         Ok(list) => list.flatten().map(|e| of(&e.path())).sum(),

@@ -135,14 +135,13 @@ fn pass<const N: usize>(
 }
 
 /// [`pass`] of `W` signals, each with filters of its own: while one waits for its products, the others go on.
-fn side_by_side<const W: usize>(sections: [[Section; 2]; W], x: [&mut [f64]; W], back: bool) {
+fn side_by_side<const W: usize>(sections: [[Section; 2]; W], mut x: [&mut [f64]; W], back: bool) {
     let shared = x.iter().map(|x| x.len()).min().unwrap_or(0);
     let mut states: [[[f64; 2]; 2]; W] = std::array::from_fn(|l| {
         let first = if back { x[l].last() } else { x[l].first() };
         sections[l].map(|s| s.steady(first.copied().unwrap_or(0.0)))
     });
     let mut rests: [&mut [f64]; W] = std::array::from_fn(|_| &mut [][..]);
-    let mut x = x;
     let mut parts: [&mut [f64]; W] = std::array::from_fn(|_| &mut [][..]);
     for l in 0..W {
         let all = std::mem::take(&mut x[l]);

@@ -105,12 +105,10 @@ impl Frame {
             (None, Some(Time::Column(Place::Number(k), factor))) => Some((k - 1, factor)),
             (None, _) => even(&table).map(|k| (k, None)),
         };
-        let (mut stamps, mut to_seconds) = (Vec::new(), 1.0);
-        let (raw, time_name) = match found {
+        let (raw, time_name, factor) = match found {
             Some((k, factor)) => {
                 let (guess, name) = time_unit(&table.columns[k]);
                 let factor = factor.unwrap_or(guess);
-                to_seconds = factor;
                 let name = [
                     ("s", 1.0),
                     ("ms", 1e-3),
@@ -127,9 +125,13 @@ impl Frame {
                     .copied()
                     .find(|x| x.abs() < 1e21)
                     .unwrap_or(0.0);
-                (column.iter().map(|x| (x - origin) * factor).collect(), name)
+                let raw = column.iter().map(|x| (x - origin) * factor).collect();
+                (raw, name, factor)
             }
-            None => ((0..rows).map(|i| i as f64).collect::<Vec<f64>>(), "none"),
+            None => {
+                let raw: Vec<f64> = (0..rows).map(|i| i as f64).collect();
+                (raw, "none", 1.0)
+            }
         };
         let clock = clock::repair(&raw, table.before, &subject);
         warnings.extend(
@@ -147,11 +149,10 @@ impl Frame {
             return Err(Error::file(&path, "", message));
         }
         let first = clock.t[0];
-        if let Some((k, _)) = found {
+        let stamps = found.map_or([0.0; 2], |(k, _)| {
             let row = |i: usize| clock.keep.as_ref().map_or(i, |keep| keep[i]);
-            let ends = [0, clock.t.len() - 1];
-            stamps.extend(ends.map(|i| table.columns[k][row(i)]));
-        }
+            [0, clock.t.len() - 1].map(|i| table.columns[k][row(i)])
+        });
         let t: Vec<f64> = clock.t.iter().map(|x| x - first).collect();
         let end = t[t.len() - 1];
         let count = (end / clock.step + 0.1).floor() as usize + 1;
@@ -217,8 +218,8 @@ impl Frame {
             step,
             start: 0.0,
             length: step * (count - 1) as f64,
-            stamps: <[f64; 2]>::try_from(stamps).unwrap_or_default(),
-            factor: to_seconds,
+            stamps,
+            factor,
             columns,
             gaps: clock
                 .gaps

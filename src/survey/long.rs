@@ -8,9 +8,10 @@
 
 use super::claim::Claim;
 use super::frame::{Course, Frame, PAUSE, Ticks, richest};
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Result, Warning, WarningKind};
 use crate::log::clock::is_gap;
 use crate::log::formats::{self, Format, Request, csv};
+use crate::log::outline::size;
 use crate::log::record::long_enough;
 use crate::plant::Plant;
 use std::ops::ControlFlow;
@@ -104,16 +105,7 @@ fn follow(
 
 /// Rows of the parts of a log, if it is so long that it should be read in parts, else 0.
 pub(super) fn rows(path: &Path) -> Result<usize> {
-    let size = match path.is_dir() {
-        true => (std::fs::read_dir(path).map_err(|e| Error::io(path, e))?)
-            .filter_map(|e| Some(e.ok()?.metadata().ok()?.len()))
-            .sum(),
-        false => {
-            let about = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
-            about.len()
-        }
-    };
-    if size < LONG {
+    if size(path) < LONG {
         return Ok(0);
     }
     let columns = match formats::detect(path)?.text() {

@@ -3,6 +3,7 @@
 use super::claim::{Claim, Means};
 use super::frame::Frame;
 use crate::error::{Warning, WarningKind};
+use crate::extremes::extremes;
 use crate::plant::Plant;
 use crate::robot::{Joint, Motion};
 use std::f64::consts::PI;
@@ -28,9 +29,10 @@ pub(super) fn fits(joint: &Joint, low: f64, high: f64) -> bool {
 
 /// Least and largest value of a column in all records.
 pub(super) fn extent(frames: &[Frame], k: usize) -> [f64; 2] {
-    let values = frames.iter().filter_map(|f| f.columns.get(k)).flatten();
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
-        [a.min(x), b.max(x)]
+    let each = frames.iter().filter_map(|f| f.columns.get(k));
+    let each = each.map(|column| extremes(column));
+    each.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], [c, d]| {
+        [a.min(c), b.max(d)]
     })
 }
 

@@ -107,16 +107,14 @@ fn explains_enough(m: &Beside, rivals: &[Rival]) -> f64 {
     if m.frozen {
         return T.confidence.parameters.above(share);
     }
+    let whole = T.confidence.share.above(share);
+    if !m.st.effects[m.member.effect].of_a_part(&m.member.shape) {
+        return whole;
+    }
     // an effect that explains a part only is believed where nothing else comes near that part
-    let effect = &m.st.effects[m.member.effect];
-    let alone = match effect.of_a_part(&m.member.shape) {
-        true => {
-            let best = least_loss(m.st, m.member.effect, rivals);
-            T.confidence.alone.above(best) * T.confidence.alone_share.above(share)
-        }
-        false => 0.0,
-    };
-    T.confidence.share.above(share).max(alone)
+    let best = least_loss(m.st, m.member.effect, rivals);
+    let alone = T.confidence.alone.above(best) * T.confidence.alone_share.above(share);
+    whole.max(alone)
 }
 
 /// Whether it does so on holdout records.

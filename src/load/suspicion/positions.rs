@@ -1,6 +1,7 @@
 //! Positions of the drives: millimetres, degrees, lengths of legs instead of strokes, turned signs.
 
 use crate::error::{Error, Result};
+use crate::extremes::extremes;
 use crate::log::Record;
 use crate::mechanism::dimensions::Dimensions;
 use crate::plant::Plant;
@@ -28,7 +29,7 @@ pub fn check(record: &Record, plant: &Plant) -> Result<()> {
     if record.q.len() != n || joints.iter().any(|j| !bounded(j)) {
         return Ok(());
     }
-    let ranges: Vec<[f64; 2]> = record.q.iter().map(|q| range(q)).collect();
+    let ranges: Vec<[f64; 2]> = record.q.iter().map(|q| extremes(q)).collect();
     let beyond: Vec<usize> = (0..n).filter(|&j| !fits(joints[j], ranges[j])).collect();
     let Some(&first) = beyond.first() else {
         return Ok(());
@@ -101,13 +102,6 @@ pub fn check(record: &Record, plant: &Plant) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn range(x: &[f64]) -> [f64; 2] {
-    let finite = x.iter().copied().filter(|v| v.is_finite());
-    finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
-        [a.min(v), b.max(v)]
-    })
 }
 
 fn bounded(joint: &Joint) -> bool {

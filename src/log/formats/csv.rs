@@ -471,8 +471,7 @@ fn cut(text: &[u8]) -> Vec<&[u8]> {
 fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> [Piece; 2] {
     let middle = text.len() / 2;
     let end = text[middle..].iter().position(|b| *b == b'\n');
-    let halves = text.split_at(end.map_or(text.len(), |at| middle + at + 1));
-    let (a, b) = halves;
+    let (a, b) = text.split_at(end.map_or(text.len(), |at| middle + at + 1));
     let [mut x, mut y] = [a, b].map(|text| empty(text, keep));
     let usual = |k: usize| keep[k] && cells[k] == Cell::Number;
     let [p, q] = match (0..keep.len()).all(usual) {
