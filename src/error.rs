@@ -192,6 +192,9 @@ warning_kinds! {
     TimeGaps = "time_gaps",
     /// Time stamps jitter; the log was resampled to an even grid.
     Resampled = "resampled",
+    /// An angle jumps by a whole turn at the ends of its range, or lies beyond its limits by one: it was made continuous, or taken
+    /// in the turn of the limits.
+    TurnsCounted = "turns_counted",
     /// Numbers look as if they had another unit, sign or side of the gear.
     UnitSuspect = "unit_suspect",
     /// What a log is stated to be does not fit the robot.

@@ -31,6 +31,7 @@ pub(crate) mod pressure;
 pub(crate) mod record;
 pub(crate) mod resample;
 pub(crate) mod table;
+pub(crate) mod turns;
 mod unit;
 mod written;
 

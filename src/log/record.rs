@@ -257,6 +257,7 @@ impl Record {
         drop(table);
 
         let mut ends = record.drop_impossible(&clock);
+        record.count_turns(&joints, &clock, &mut ends);
         record.fill_dropped(&clock, &mut ends)?;
         record.check_channels(&joints, &ends)?;
         let duration = clock.t[clock.t.len() - 1] - clock.t[0];

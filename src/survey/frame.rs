@@ -2,7 +2,7 @@
 
 use super::claim::{Claim, Means};
 use super::file_name;
-use crate::error::{Error, Result, Warning, WarningKind, agreeing};
+use crate::error::{Error, Result, Warning, WarningKind, agreeing, counted};
 use crate::extremes::extremes;
 use crate::log::Table;
 use crate::log::channels;
@@ -13,10 +13,12 @@ use crate::log::names;
 use crate::log::place::Place;
 use crate::log::record::{impossible, too_few, unmeasured};
 use crate::log::resample::{Order, fill, interpolate};
+use crate::log::turns;
 use crate::median::median;
 use crate::plant::Plant;
 use rayon::prelude::*;
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 /// Grid points of a record, in its rows.
@@ -184,6 +186,18 @@ impl Frame {
                 ));
             }
             wrong.iter().for_each(|&i| y[i] = f64::NAN);
+            if found.is_none_or(|(time, _)| time != k)
+                && let Some(count) = continuous(&mut y)
+            {
+                warnings.push(Warning::new(
+                    WarningKind::TurnsCounted,
+                    format!("{subject}: {}", table.names[k]),
+                    format!(
+                        "it jumps by a whole turn {}: it was made continuous",
+                        counted(count, "time")
+                    ),
+                ));
+            }
             let holes = y.iter().filter(|x| !x.is_finite()).count();
             if holes == y.len() {
                 columns.push(vec![0.0; count]);
@@ -376,13 +390,29 @@ impl Frame {
                 let saturated = clipped.map_or(0, |c| c.count);
                 Course {
                     moves,
-                    range: q.as_deref().map(extremes),
+                    range: q.as_deref().map(|q| in_turn(extremes(q), robot, j)),
                     fastest,
                     saturated,
                 }
             })
             .collect()
     }
+}
+
+/// Smallest and largest position of a joint in the turn in which it is read.
+fn in_turn(range: [f64; 2], robot: Option<&Plant>, j: usize) -> [f64; 2] {
+    let joint = robot.and_then(|p| p.actuators().get(j).copied());
+    let by = joint.map_or(0.0, |joint| turns::to_add(joint, range));
+    range.map(|x| x + by * TAU)
+}
+
+/// Makes a column continuous that is an angle in rad or degrees which wraps at a whole turn; how often it jumps.
+fn continuous(y: &mut [f64]) -> Option<usize> {
+    let ends = extremes(y);
+    let turn = [TAU, 360.0]
+        .into_iter()
+        .find(|turn| turns::may_wrap(ends, *turn))?;
+    turns::unwrap(y, turn).map(|(count, _)| count)
 }
 
 /// The record in which the columns change most, each measured by its largest range in any record.

@@ -23,7 +23,7 @@ pub(super) fn claims(
         return Vec::new();
     };
     let confidence = match format {
-        Format::Csv | Format::Npz | Format::Mat => NAMED,
+        Format::Csv | Format::Npz | Format::Mat | Format::Json => NAMED,
         _ => DOCUMENTED,
     };
     let mut all = names::all(&frame.names, &frame.labels, format);

@@ -4,6 +4,7 @@ use super::claim::{Claim, Means};
 use super::frame::Frame;
 use crate::error::{Warning, WarningKind};
 use crate::extremes::extremes;
+use crate::log::turns;
 use crate::plant::Plant;
 use crate::robot::{Joint, Motion};
 use std::f64::consts::PI;
@@ -129,8 +130,22 @@ pub(super) fn examine(
         return;
     }
     for k in far {
-        let [low, high] = extent(frames, k);
         let f = claims[k].factor();
+        let [low, high] = extent(frames, k).map(|x| x * f);
+        let range = [low.min(high), low.max(high)];
+        if let Some(j) = claims[k].at.and_then(|j| joints.get(j))
+            && turns::to_add(j, range) != 0.0
+        {
+            warnings.push(Warning::new(
+                WarningKind::TurnsCounted,
+                &claims[k].column,
+                format!(
+                    "it goes from {:.3} to {:.3}, beyond the limits of {} and within them in another turn: it is taken so",
+                    range[0], range[1], j.name
+                ),
+            ));
+            continue;
+        }
         warnings.push(Warning::new(
             WarningKind::UnitSuspect,
             &claims[k].column,
@@ -138,13 +153,13 @@ pub(super) fn examine(
                 "as the position of {} it goes from {:.3} to {:.3}, beyond its limits: another unit, another zero or \
                  another joint",
                 claims[k].joint.clone().unwrap_or_default(),
-                (low * f).min(high * f),
-                (low * f).max(high * f)
+                range[0],
+                range[1]
             ),
         ));
         // a little beyond is more likely a limit of the file that is not the machine's
         let width = joints[claims[k].at.unwrap_or(0)].limits.position;
-        if high - low > 1.5 * (width[1] - width[0]) {
+        if range[1] - range[0] > 1.5 * (width[1] - width[0]) {
             claims[k].confidence = 0.4;
         }
     }

@@ -46,7 +46,7 @@ const COUNT: usize = 120;
 const USUAL: Duration = Duration::from_secs(40);
 
 /// Files, and the commands that read each.
-const TARGETS: [(&str, &[&str]); 31] = [
+const TARGETS: [(&str, &[&str]); 33] = [
     (
         "arm.urdf",
         &[
@@ -156,6 +156,8 @@ const TARGETS: [(&str, &[&str]); 31] = [
     ("two.mat", FOREIGN),
     ("two.npz", FOREIGN),
     ("two_packed.npz", FOREIGN),
+    ("foreign.jsonl", FOREIGN),
+    ("columns.json", FOREIGN),
     (
         "foreign.toml",
         &[
@@ -354,6 +356,25 @@ fn logs_of_others(folder: &Path) {
         .replacen("t,", "stamp [s],", 1);
     let table = ours.replacen(header, &others, 1).replace(',', "; ");
     std::fs::write(folder.join("foreign.csv"), table).unwrap();
+    let columns: Vec<&str> = others.split(',').collect();
+    let cells = |line: &str| line.split(',').map(String::from).collect::<Vec<_>>();
+    let rows: Vec<Vec<String>> = ours.lines().skip(1).take(400).map(cells).collect();
+    let objects = rows.iter().map(|row| {
+        let members = columns.iter().zip(row);
+        let members: Vec<String> = members.map(|(c, x)| format!("\"{c}\": {x}")).collect();
+        format!("{{{}}}\n", members.join(", "))
+    });
+    std::fs::write(folder.join("foreign.jsonl"), objects.collect::<String>()).unwrap();
+    let lists = columns.iter().enumerate().map(|(k, c)| {
+        let list: Vec<&str> = rows.iter().map(|row| &row[k][..]).collect();
+        format!("\"{c}\": [{}]", list.join(", "))
+    });
+    let lists: Vec<String> = lists.collect();
+    std::fs::write(
+        folder.join("columns.json"),
+        format!("{{{}}}", lists.join(",\n")),
+    )
+    .unwrap();
     let line = "log foreign.csv --robot arm.toml --output f";
     let (status, messages) = run(folder, line);
     assert_eq!(status, Some(0), "{line}\n{messages}");

@@ -195,6 +195,109 @@ fn a_joint_state_without_a_header_is_read() {
     }
 }
 
+/// A recorder that counts angles from 0° to 360° (Kortex), with joints that pass zero: they are continuous in the survey and in
+/// the record, in the turn of the limits, and the model explains the torques with them as before.
+#[test]
+fn angles_that_jump_by_a_turn_are_continuous() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("kortex.csv");
+    // the first joint about zero, the others where they are
+    let mut q = m.q.clone();
+    let middle = q[0].iter().sum::<f64>() / q[0].len() as f64;
+    q[0].iter_mut().for_each(|x| *x -= middle);
+    let columns = ["position", "velocity", "torque"].map(|what| {
+        let all = (0..JOINTS).map(|j| format!("actuators[{j}].{what}"));
+        all.collect::<Vec<_>>().join(",")
+    });
+    m.write(&path, &format!("time,{}", columns.join(",")), &|i| {
+        let mut out = vec![m.t[i].to_string()];
+        out.extend(
+            q.iter()
+                .map(|c| c[i].to_degrees().rem_euclid(360.0).to_string()),
+        );
+        out.extend(m.dq.iter().map(|c| c[i].to_degrees().to_string()));
+        out.extend(numbers(&m.tau, i));
+        out
+    });
+    let found = of(&path, &m.plant);
+    expect(&found, Means::Position, &|j| {
+        format!("actuators[{j}].position")
+    });
+    expect(&found, Means::Torque, &|j| format!("actuators[{j}].torque"));
+    let jumps = |w: &str| w.contains("jumps by a whole turn");
+    let first = found
+        .warnings
+        .iter()
+        .find(|w| w.subject.contains("actuators[0].position"));
+    assert!(
+        first.is_some_and(|w| jumps(&w.message)),
+        "{:?}",
+        found.warnings
+    );
+    let toml = folder.path().join("experiment.toml");
+    let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
+    std::fs::write(&toml, &text).unwrap();
+    let read = excite::log::Experiment::read(&toml).unwrap();
+    let record = &read.records[0];
+    assert!(record.warnings.iter().any(|w| jumps(&w.message)));
+    for (j, (read, was)) in record.q.iter().zip(&q).enumerate() {
+        let turns = ((read[0] - was[0]) / std::f64::consts::TAU).round();
+        let by = turns * std::f64::consts::TAU;
+        assert!(
+            read.iter().zip(was).all(|(a, b)| (a - b - by).abs() < 1e-9),
+            "{j}"
+        );
+        let limits = m.plant.actuators()[j].limits.position;
+        assert!(
+            read.iter().all(|x| (limits[0]..limits[1]).contains(x)),
+            "{j}"
+        );
+    }
+}
+
+/// JSON Lines of a `JointState`, as scripts write them: the names say which joint is which, the stamp is in two members.
+#[test]
+fn lines_of_json_are_read() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("states.jsonl");
+    let [q, dq, tau] = [&m.q, &m.dq, &m.tau].map(|c| permuted(c));
+    let names: Vec<String> = ORDER
+        .iter()
+        .map(|&j| format!("\"{}\"", m.joint(j)))
+        .collect();
+    let list = |c: &[Vec<f64>], i| numbers(c, i).collect::<Vec<_>>().join(", ");
+    let text: String = (0..m.t.len())
+        .map(|i| {
+            let t = 1_700_000_000.3 + m.t[i];
+            format!(
+                "{{\"header\": {{\"stamp\": {{\"sec\": {}, \"nanosec\": {}}}}}, \"name\": [{}], \"position\": [{}], \
+                 \"velocity\": [{}], \"effort\": [{}]}}\n",
+                t.floor(),
+                ((t - t.floor()) * 1e9).round(),
+                names.join(", "),
+                list(&q, i),
+                list(&dq, i),
+                list(&tau, i)
+            )
+        })
+        .collect();
+    // the recorder was stopped in the middle of a line
+    std::fs::write(&path, &text[..text.len() - 40]).unwrap();
+    let found = of(&path, &m.plant);
+    for (means, what) in ARRAYS {
+        expect(&found, means, &|j| format!("{what}[{}]", place(j)));
+    }
+    assert!((found.frames[0].step - 0.004).abs() < 1e-8);
+    assert_eq!(found.frames[0].rows, m.t.len() - 1);
+    let toml = folder.path().join("experiment.toml");
+    let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
+    std::fs::write(&toml, &text).unwrap();
+    let read = excite::log::Experiment::read(&toml).unwrap();
+    assert_eq!(read.records[0].q[0][9], m.q[0][9], "{text}");
+}
+
 /// Without the names, arrays in another order are not given to joints by their numbers: neither the positions that the
 /// torques contradict, nor what belongs to them.
 #[test]

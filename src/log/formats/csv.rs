@@ -326,7 +326,7 @@ fn finish(table: &mut Table, dialect: &Dialect) {
 }
 
 /// Makes the seconds of a stamp in two columns the whole stamp.
-fn whole_stamp(table: &mut Table) {
+pub(super) fn whole_stamp(table: &mut Table) {
     let Some([seconds, more]) = stamp_in_two(&table.names) else {
         return;
     };

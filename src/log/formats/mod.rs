@@ -5,6 +5,7 @@
 //! | CSV of any layout, RTDE, libfranka, Kortex | `csv` | the header's, or numbers from 1; lists in cells as `name[0]` … |
 //! | rosbag2 | `db3`, `mcap` | `position/JOINT`, `velocity/JOINT`, `effort/JOINT`, … (`bag`) |
 //! | NumPy | `npz` | `array`, or `array[0]` … |
+//! | JSON, JSON Lines | `json` | `member`, `object.member`, `list[0]` … |
 //! | MATLAB 5 to 7.2 | `mat` | `variable`, `struct.field`, or `variable[0]` … |
 
 mod arrays;
@@ -14,6 +15,7 @@ mod cdr;
 pub(crate) mod csv;
 mod db3;
 mod dialect;
+mod json;
 mod mat;
 mod mcap;
 mod npz;
@@ -46,6 +48,8 @@ pub enum Format {
     Npz,
     /// MATLAB 5 to 7.2
     Mat,
+    /// JSON: one object a line, a list of objects, or one object of lists
+    Json,
 }
 
 impl Format {
@@ -60,6 +64,7 @@ impl Format {
             Format::Kortex => "kortex",
             Format::Npz => "npz",
             Format::Mat => "mat",
+            Format::Json => "json",
         }
     }
 
@@ -158,6 +163,7 @@ pub(crate) fn read(path: &Path, request: &Request) -> Result<Read> {
         }
         Format::Npz => plain(npz::read(path)?, found),
         Format::Mat => plain(mat::read(path)?, found),
+        Format::Json => plain(json::read(path)?, found),
         _ => {
             let (table, ()) = csv::read(path, request.wanted, &|_| Ok(()))?;
             let format = request
@@ -324,10 +330,24 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
         return refuse("it is text in UTF-16; save it as UTF-8 (or plain CSV)");
     }
+    if head.starts_with(b"PAR1") || head.starts_with(b"ARROW1") || head.starts_with(b"FEA1") {
+        return refuse(
+            "it is Parquet or Arrow, which are not read; save it as CSV (pandas: `to_csv`)",
+        );
+    }
+    // protocols 2 to 5
+    if matches!(head, [0x80, 2..=5, ..]) {
+        return refuse(
+            "it is a pickle of Python, which is not read; save its arrays with `numpy.savez`",
+        );
+    }
     if head.iter().filter(|b| **b == 0).count() > head.len() / 8 {
         return refuse(
-            "it is a binary file of no known format (known are csv, db3, mcap, npz and mat)",
+            "it is a binary file of no known format (known are csv, json, db3, mcap, npz and mat)",
         );
+    }
+    if json::begins(head) {
+        return Ok(Format::Json);
     }
     Ok(Format::Csv)
 }

@@ -43,8 +43,10 @@ pub(super) fn read(path: &Path) -> Result<Table> {
     }
     let mut list = Bytes::new(data.get(at as usize..).unwrap_or_default(), true);
     let (mut found, mut left) = (Vec::new(), Vec::new());
+    let mut workbook = false;
     for _ in 0..count {
         let (name, method, packed, full, head) = entry(&mut list).ok_or_else(broken)?;
+        workbook |= name.starts_with("xl/");
         let Some(short) = name.strip_suffix(".npy") else {
             continue;
         };
@@ -63,6 +65,10 @@ pub(super) fn read(path: &Path) -> Result<Table> {
             }
             Err(m) => return Err(fail(m)),
         }
+    }
+    if workbook && found.is_empty() {
+        let message = "it is a workbook of Excel, which is not read; save its sheet as CSV";
+        return Err(Error::file(path, "", message));
     }
     let mut table = arrays::table(found, path)?;
     if !left.is_empty() {

@@ -1,13 +1,16 @@
 //! What is wrong with the channels of a log: dropped, stuck and saturated values, units, periods.
 
+use super::numbered;
 use crate::error::{Error, Result, Warning, WarningKind, agreeing, counted};
 use crate::extremes::{all_finite, extremes};
 use crate::log::Record;
 use crate::log::channels::{self, Moving};
 use crate::log::clock::Clock;
 use crate::log::resample::fill;
-use crate::robot::Joint;
+use crate::log::turns;
+use crate::robot::{Joint, Motion};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Shortest period of a motion, in samples.
@@ -20,6 +23,66 @@ const LONGEST: f64 = 1e3;
 const ENDS: f64 = 0.2;
 
 impl Record {
+    /// Makes the angles of joints continuous that wrap at a whole turn, and takes those beyond the limits by whole turns in
+    /// the turn of the limits; `ends` hold the smallest and largest value of each channel.
+    pub(super) fn count_turns(&mut self, joints: &[&Joint], clock: &Clock, ends: &mut [[f64; 2]]) {
+        let path = self.path.display().to_string();
+        let mut warnings = Vec::new();
+        // commands and second encoders go where the encoder is
+        let mut middle = vec![0.0; joints.len()];
+        for ((name, _, y), ends) in self.channels().into_iter().zip(ends) {
+            let angle = numbered(&name).filter(|(group, _)| ["q", "qref", "ql"].contains(group));
+            let Some((group, j)) = angle.map(|(group, k)| (group, k - 1)) else {
+                continue;
+            };
+            if joints[j].motion != Motion::Revolute {
+                continue;
+            }
+            let mut said = None;
+            if turns::may_wrap(*ends, TAU)
+                && let Some((count, first)) = turns::unwrap(y, TAU)
+            {
+                *ends = extremes(y);
+                let row = clock.before + clock.keep.as_ref().map_or(first, |k| k[first]) + 1;
+                said = Some(format!(
+                    "it jumps by a whole turn {}, first in row {row}: it was made continuous",
+                    counted(count, "time")
+                ));
+            }
+            let centre = 0.5 * (ends[0] + ends[1]);
+            let by = match group {
+                "q" => turns::to_add(joints[j], *ends),
+                _ => ((middle[j] - centre) / TAU).round(),
+            };
+            if by != 0.0 {
+                y.iter_mut().for_each(|x| *x += by * TAU);
+                *ends = ends.map(|x| x + by * TAU);
+                let here = format!(
+                    "it was taken {} {}",
+                    counted(by.abs() as usize, "turn"),
+                    if by < 0.0 { "less" } else { "more" }
+                );
+                said = Some(match (said, group) {
+                    (Some(said), _) => said,
+                    (None, "q") => format!(
+                        "it goes from {:.3} to {:.3}, beyond the limits of {} and within them in another turn: {here}",
+                        ends[0] - by * TAU,
+                        ends[1] - by * TAU,
+                        joints[j].name
+                    ),
+                    (None, _) => format!("it is a turn or more from the positions: {here}"),
+                });
+            }
+            if group == "q" {
+                middle[j] = 0.5 * (ends[0] + ends[1]);
+            }
+            let said =
+                said.map(|s| Warning::new(WarningKind::TurnsCounted, format!("{path}: {name}"), s));
+            warnings.extend(said);
+        }
+        self.warnings.extend(warnings);
+    }
+
     /// Interpolates dropped values, marks them, and names their channels; `extent` holds the smallest and largest value of each.
     pub(super) fn fill_dropped(&mut self, clock: &Clock, extent: &mut [[f64; 2]]) -> Result<()> {
         let path = self.path.clone();
