@@ -89,7 +89,7 @@ use channel::Channel;
 use data::Data;
 use payload::Loads;
 use rayon::prelude::*;
-use searched::Searched;
+use searched::{Assumed, Searched};
 use std::borrow::Cow;
 
 #[doc(hidden)]
@@ -99,16 +99,15 @@ use std::borrow::Cow;
 /// No record to fit to, records that are too short or hold too few sound samples, a payload that cannot be
 /// honoured, poses that cannot be reached.
 pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
-    prepare_with(plant, logs, Loads::One, None)
+    prepare_with(plant, logs, Loads::One, Assumed::default())
 }
 
-/// The same with one unknown load, or one by record, and with the time by which dry friction reverses early, where it is
-/// not looked for.
+/// The same with one unknown load, or one by record, and with what is not looked for.
 fn prepare_with<'a>(
     plant: &'a Plant,
     logs: &[log::Record],
     loads: Loads,
-    lead: Option<f64>,
+    assumed: Assumed,
 ) -> Result<Data<'a>> {
     if !logs.iter().any(|r| r.purpose == Purpose::Fit) {
         return Err(Error::Infeasible(
@@ -126,11 +125,11 @@ fn prepare_with<'a>(
     data.carry(loads)?;
     // what the log makes of a torque, then what the encoders cannot resolve
     let phi = data.values();
-    data.reverse_early(lead.unwrap_or(0.0), &phi)?;
-    let leads = lead.is_none() && data.find_lead()?;
+    data.reverse_early(assumed.lead.unwrap_or(0.0), &phi)?;
+    let leads = assumed.lead.is_none() && data.find_lead()?;
     for pass in 0..2 {
         let channel = Channel::of(&data, leads);
-        data.window = channel.window;
+        data.window = assumed.window.unwrap_or(channel.window);
         data.reverse_early(channel.lead, &channel.phi)?;
         if pass == 0 {
             let residual = data.gap_to(&data.model_torque(&channel.phi));
@@ -185,40 +184,37 @@ pub fn of_logs(
     let mut carried = carried::find(&mut data)?;
     if let Some(found) = &carried {
         logs = Cow::Owned(found.stated(&logs));
-        data = prepare_with(plant, &logs, found.loads, None)?;
+        data = prepare_with(plant, &logs, found.loads, Assumed::default())?;
     }
     if let Some(found) = carried::remounted(&mut data)? {
         logs = Cow::Owned(found.stated(&logs));
-        data = prepare_with(plant, &logs, found.loads, None)?;
+        data = prepare_with(plant, &logs, found.loads, Assumed::default())?;
         carried.iter_mut().for_each(|c| c.loads = found.loads);
     }
     let logs = logs.as_ref();
     let effects = catalogue::all();
     closeness::tighten(&mut data, &effects)?;
     let first = Searched::of(&data, &effects, progress)?;
-    // a delay and the time by which a simulator's friction reverses early are nearly the same
-    let early = match first.may_be_early(&effects) {
-        true => {
-            let loads = carried.as_ref().map_or(Loads::One, |c| c.loads);
-            let mut early = prepare_with(plant, logs, loads, Some(T.reversals.usual))?;
-            closeness::tighten(&mut early, &effects)?;
-            Some(early)
+    let loads = carried.as_ref().map_or(Loads::One, |c| c.loads);
+    let others = first.doubts(&effects).into_iter().map(|assumed| {
+        let mut data = prepare_with(plant, logs, loads, assumed)?;
+        closeness::tighten(&mut data, &effects)?;
+        Ok(data)
+    });
+    let others = others.collect::<Result<Vec<Data>>>()?;
+    let mut found = first;
+    for data in &others {
+        let other = Searched::of(data, &effects, progress)?;
+        if other.stands_for(&found, &effects) {
+            found = other;
         }
-        false => None,
-    };
-    let second = match &early {
-        Some(data) => Some(Searched::of(data, &effects, progress)?),
-        None => None,
-    };
+    }
     let Searched {
         evidence,
         cx,
         list,
         decision,
-    } = match second {
-        Some(second) if second.stands_for(&first, &effects) => second,
-        _ => first,
-    };
+    } = found;
     let data = evidence.data;
     progress("report");
 

@@ -115,7 +115,7 @@ impl Data<'_> {
 
     /// A function of the position of one actuator and of the velocity that its dry friction feels, averaged as by
     /// [`Data::own`].
-    pub fn dry(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    fn dry(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         self.led(j, self.lead, f)
     }
 

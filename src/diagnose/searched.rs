@@ -1,7 +1,9 @@
 //! What the search found in records, and whether another search of the same records stands for it.
 //!
 //! A delay of the torque and the time by which a simulator's dry friction reverses early are nearly the same, and a large effect
-//! moves both. So where a delay is claimed, the records are searched once more with the time of a simulator's usual settings.
+//! moves both. So where a delay is claimed, the records are searched once more with the time of a simulator's usual settings. And
+//! what a motion shakes and no effect explains looks like a wide window of the torque: where the widest is found and the gap
+//! is not explained, they are searched with that of plus and minus one sample.
 
 use super::catalogue::{Context, Effect};
 use super::data::Data;
@@ -11,6 +13,16 @@ use super::settle::settled;
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::{Decision, Member, Verdict, decide, inflation};
 use crate::error::Result;
+use std::cmp::Ordering;
+
+/// What is not looked for in a log, but assumed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Assumed {
+    /// time by which dry friction reverses early, s
+    pub lead: Option<f64>,
+    /// variance of the window of the torque beyond plus and minus one sample, samples squared
+    pub window: Option<f64>,
+}
 
 /// What the search found in records.
 pub struct Searched<'a> {
@@ -49,21 +61,42 @@ impl<'a> Searched<'a> {
         })
     }
 
-    /// Whether what it claims may be the early friction of a simulator with its usual settings, which was not taken for
-    /// found.
-    pub fn may_be_early(&self, effects: &[Box<dyn Effect>]) -> bool {
+    /// What else the log may be, where the search leaves doubts about it: early friction of a simulator with its usual settings,
+    /// which was not taken for found and may pass for a delay that is claimed; a window that was found as wide as any.
+    pub fn doubts(&self, effects: &[Box<dyn Effect>]) -> Vec<Assumed> {
         let data = self.evidence.data;
-        data.may_lead() && data.lead != T.reversals.usual && self.late(effects) > 0
+        let late = data.may_lead() && data.lead != T.reversals.usual && self.late(effects) > 0;
+        let early = late.then_some(Assumed {
+            lead: Some(T.reversals.usual),
+            ..Assumed::default()
+        });
+        let wide = data.window >= T.window.widest && !self.all();
+        let plain = wide.then_some(Assumed {
+            window: Some(0.0),
+            ..Assumed::default()
+        });
+        early.into_iter().chain(plain).collect()
     }
 
     /// Whether it explains the records with fewer of the effects that the other claims: as well as what that one leaves
-    /// allows, or, without any of them, all that counts, where the other took friction to reverse early, too.
+    /// allows, or, without any of them, all that counts, where the other took friction to reverse early, too. Or with no more
+    /// of them, and clearly better.
     pub fn stands_for(&self, other: &Searched, effects: &[Box<dyn Effect>]) -> bool {
-        let all = matches!(self.decision.verdict, Verdict::NoGap | Verdict::Explained);
+        let all = self.all();
         let as_well = || self.left() < other.left() + other.margin();
         let late = self.late(effects);
         let none = late == 0 && all && other.evidence.data.lead > 0.0;
-        late < other.late(effects) && (none || as_well())
+        let better = || self.left() + other.margin() < other.left();
+        match late.cmp(&other.late(effects)) {
+            Ordering::Less => none || as_well(),
+            Ordering::Equal => better(),
+            Ordering::Greater => false,
+        }
+    }
+
+    /// Whether all that counts is explained.
+    fn all(&self) -> bool {
+        matches!(self.decision.verdict, Verdict::NoGap | Verdict::Explained)
     }
 
     /// How many effects it claims that dry friction that reverses early may pass for.

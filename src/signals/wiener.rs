@@ -7,7 +7,7 @@
 //! filter. Otherwise the positions pass a zero-phase low-pass and central differences.
 
 use super::cutoff::Spectra;
-use super::fourier::{Inverse, Plan};
+use super::fourier::{Inverse, Plan, derivatives};
 use super::repeats::scatter;
 use crate::dynamics::Samples;
 use std::f64::consts::PI;
@@ -37,7 +37,7 @@ fn periodic(
     let periods = count / cycle;
     let period = cycle as f64 * dt;
     let omega = 2.0 * PI / period;
-    let lines = ((BAND * period) as usize).min(cycle / 2 - 1).max(1);
+    let lines = lines(cycle, dt);
     let variance = scatter(q, n, count, cycle, free);
     let mut out = Samples::zeros(n, count);
     let mut band: f64 = 0.0;
@@ -121,6 +121,27 @@ pub struct Differentiated {
 pub fn limited(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
     let cycles = cycle.map(|c| (c, c * (x.len() / c - 1)));
     differentiated(x, &[0.0], x.len(), cycles, dt).motion.q
+}
+
+/// What follows from a motion that [`differentiated`] has limited to its band, limited likewise: the mean period up to
+/// [`BAND`] where the motion repeats, low-passed otherwise.
+pub fn likewise(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
+    let Some(cycle) = cycle else {
+        return low_pass(x, half_width(dt));
+    };
+    let periods = (x.len() / cycle).max(1);
+    let at = |i: usize| (0..periods).map(|p| x[p * cycle + i]).sum::<f64>();
+    let mean: Vec<f64> = (0..cycle).map(|i| at(i) / periods as f64).collect();
+    let period = cycle as f64 * dt;
+    let [one, ..] = derivatives(&mean, period, lines(cycle, dt));
+    one.iter().copied().cycle().take(x.len()).collect()
+}
+
+/// Harmonics of a motion of this period that are looked at.
+fn lines(cycle: usize, dt: f64) -> usize {
+    ((BAND * cycle as f64 * dt) as usize)
+        .min(cycle / 2 - 1)
+        .max(1)
 }
 
 /// Positions limited to a band, with their derivatives, noise and band: by Fourier series where the

@@ -163,6 +163,12 @@ impl<'a> Context<'a> {
 
     /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
     pub fn sign(&self, j: usize) -> Vec<f64> {
+        self.data.dry_sign(j, 0.0)
+    }
+
+    /// The same as dry friction of the model feels it: that of a simulator's constraint reverses before the velocity does.
+    /// What comes on top is a torque of the velocity.
+    pub fn dry_sign(&self, j: usize) -> Vec<f64> {
         self.data.dry_sign(j, self.data.lead)
     }
 

@@ -33,7 +33,7 @@ impl Effect for CoulombFriction {
     }
 
     fn columns(&self, cx: &Context, place: &Place, _shape: &Shape, _draft: bool) -> Vec<Column> {
-        let values = cx.sign(place.first());
+        let values = cx.dry_sign(place.first());
         vec![Column::on(place.first(), values)]
     }
 

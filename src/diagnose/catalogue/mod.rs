@@ -155,6 +155,11 @@ pub trait Effect: Sync {
     fn of_a_part(&self, _shape: &Shape) -> bool {
         true
     }
+    /// Whether its friction changes most about the reversals of its joint: what the formula of a large one misses there looks like
+    /// another one.
+    fn at_reversals(&self, _shape: &Shape) -> bool {
+        false
+    }
     /// Whether it rings with damping, as the loop of the robot's controller does.
     fn rings(&self, _shape: &Shape) -> bool {
         false

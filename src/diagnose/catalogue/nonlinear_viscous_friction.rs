@@ -26,6 +26,11 @@ impl Effect for NonlinearViscousFriction {
             .to_vec()
     }
 
+    /// A power below one is steepest there.
+    fn at_reversals(&self, shape: &Shape) -> bool {
+        shape[0] < 1.0
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let (joint, power) = (e.place.first(), e.shape[0]);
         let top = cx.data.speed[joint];

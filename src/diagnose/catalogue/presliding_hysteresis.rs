@@ -38,6 +38,10 @@ impl Effect for PreslidingHysteresis {
         3
     }
 
+    fn at_reversals(&self, _shape: &Shape) -> bool {
+        true
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let j = e.place.first();
         let [level, reach] = [e.eta[0], e.shape[0]].map(py);

@@ -31,6 +31,10 @@ impl Effect for StribeckFriction {
         k == 0
     }
 
+    fn at_reversals(&self, _shape: &Shape) -> bool {
+        true
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let j = e.place.first();
         let [rise, v, power] = [e.eta[0], e.shape[0], e.shape[1]].map(py);
@@ -44,7 +48,7 @@ impl Effect for StribeckFriction {
         let rise = |v: f64| {
             crate::diagnose::window::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
         };
-        vec![Column::on(j, cx.data.dry(j, |_, v| rise(v)))]
+        vec![Column::on(j, cx.data.own(j, |_, v| rise(v)))]
     }
 
     // a fit about reversals can ask for many times what slides

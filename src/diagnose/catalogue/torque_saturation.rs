@@ -75,6 +75,11 @@ impl Effect for TorqueSaturation {
         vec![Column::on(j, values)]
     }
 
+    // a drive that gave more torque per current at high torque would be no saturated one
+    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
+        eta[0] > 0.0
+    }
+
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
         let Estimate {
             place,

@@ -1,16 +1,27 @@
 //! A kinematic error of the gear that repeats with its turn, with the inertia that it shakes.
 
 use super::*;
+use crate::diagnose::window::{FINE, fine_values, from_fine};
+use crate::signals::wiener::likewise;
 
 /// Transmission error.
 pub struct TransmissionError;
+
+/// Its shapes have an order, and on a spring the natural frequency of the link, Hz.
+const SPRUNG: u8 = 1;
+/// Orders per turn of the motor that are tried on a spring.
+const SPRUNG_ORDERS: [f64; 3] = [1.0, 2.0, 4.0];
+/// Natural frequencies that are tried.
+const FREQUENCIES: [f64; 4] = [20.0, 30.0, 45.0, 70.0];
+/// Damping ratio of that spring.
+const DAMPING: f64 = 0.05;
 
 impl Effect for TransmissionError {
     fn card(&self) -> Card {
         Card {
             name: "transmission_error",
             title: "transmission error",
-            equation: "M d²/dt² (a sin kNq + b cos kNq)",
+            equation: "M d²/dt² (a sin kNq + b cos kNq), or the same on a spring",
             source: "Tuttle & Seering 1996; Ghorbel, Gandhi & Alpeter 2001",
             aliases: &[],
             separated_by: "slow constant speed: a line in position; two speeds tell ripple from kinematic error",
@@ -25,10 +36,37 @@ impl Effect for TransmissionError {
     }
 
     fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
-        super::cogging::orders(cx, place.first())
+        let mut all = super::cogging::orders(cx, place.first());
+        let ratio = cx.data.plant.actuators()[place.first()].gear_ratio;
+        let orders = all.iter().map(|s| s[0]);
+        let few: Vec<f64> = match ratio {
+            Some(ratio) => orders
+                .filter(|k| SPRUNG_ORDERS.map(|n| n * ratio.abs()).contains(k))
+                .collect(),
+            None => orders.take(SPRUNG_ORDERS.len()).collect(),
+        };
+        let sprung = |k: f64| FREQUENCIES.map(|f| Shape::new(SPRUNG, &[k, f]));
+        all.extend(few.into_iter().flat_map(sprung));
+        all
+    }
+
+    fn forms(&self) -> u8 {
+        2
+    }
+
+    fn refinable(&self, k: usize) -> bool {
+        k == 1
+    }
+
+    /// On a spring it comes with what the load makes the spring do, of which there is as much as of any joint's.
+    fn plausible(&self, _cx: &Context, _place: &Place, shape: &Shape, eta: &[f64]) -> bool {
+        shape.form != SPRUNG || eta[2] > 0.4 && eta[2] < 2.0
     }
 
     fn element(&self, _cx: &Context, e: &Estimate) -> Option<Element> {
+        if e.shape.form == SPRUNG {
+            return None;
+        }
         let k = e.shape[0];
         let [sine, cosine, order] = [e.eta[0] / (k * k), e.eta[1] / (k * k), k].map(py);
         let lines = vec![
@@ -41,24 +79,28 @@ impl Effect for TransmissionError {
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
-        let (j, k) = (place.first(), shape[0]);
-        // second derivative of sin kq: k q̈ cos kq − k² q̇² sin kq; per 1/k² to keep numbers near 1
-        let shaken = |phase: f64| {
+        let j = place.first();
+        let column = |of: &dyn Fn(usize, &Series) -> Vec<f64>| {
             let mut all = Vec::with_capacity(cx.data.rows());
-            for r in &cx.data.records {
-                let (q, v) = r.state(j);
-                let a = r.acceleration(j);
-                let mut i = 0;
-                let values = crate::diagnose::window::fine_values(q, v, a, r.dt, |q, v, _| {
-                    let a = a[(i / crate::diagnose::window::FINE).min(a.len() - 1)];
-                    i += 1;
-                    a / k * (k * q + phase).cos() - v * v * (k * q + phase).sin()
-                });
-                crate::diagnose::window::from_fine(&values, r.count, &mut all);
+            for (i, r) in cx.data.records.iter().enumerate() {
+                // the acceleration of the motor, which nearly makes up for it where the motor is free to follow, ends there
+                all.extend(likewise(&of(i, r), r.cycle, r.dt));
             }
             cx.inertial(j, &all, draft)
         };
-        vec![shaken(0.0), shaken(std::f64::consts::FRAC_PI_2)]
+        let phases = [0.0, std::f64::consts::FRAC_PI_2];
+        if shape.form != SPRUNG {
+            return phases
+                .map(|phase| column(&|_, r| shaken(r, j, shape[0], phase)))
+                .to_vec();
+        }
+        let swings = phases.map(|phase| column(&|_, r| swung(r, j, [shape[0], shape[1]], phase)));
+        let load = column(&|i, r| {
+            let carried = spring::carried(cx, j, i);
+            let [.., a] = spring::way(carried, r.dt, 0.0, shape[1], DAMPING, 0.0, r.cycle);
+            a
+        });
+        swings.into_iter().chain([load]).collect()
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -72,7 +114,7 @@ impl Effect for TransmissionError {
         let scale = 1.0 / (shape[0] * shape[0]);
         let amplitude = eta[0].hypot(eta[1]);
         let per = cx.unit(place.first(), Quantity::Order);
-        vec![
+        let mut all = vec![
             value(
                 "amplitude",
                 scale * amplitude,
@@ -86,6 +128,53 @@ impl Effect for TransmissionError {
                 "rad",
             ),
             constant("per_position", shape[0], per),
-        ]
+        ];
+        if shape.form == SPRUNG {
+            all.push(constant("natural_frequency", shape[1], "Hz"));
+        }
+        all
     }
+}
+
+/// `1/k²` times the acceleration of `sin(kq + phase)`.
+fn shaken(r: &Series, j: usize, k: f64, phase: f64) -> Vec<f64> {
+    let ((q, v), a) = (r.state(j), r.acceleration(j));
+    let mut i = 0;
+    // k q̈ cos kq − k² q̇² sin kq
+    let values = fine_values(q, v, a, r.dt, |q, v, _| {
+        let a = a[(i / FINE).min(a.len() - 1)];
+        i += 1;
+        a / k * (k * q + phase).cos() - v * v * (k * q + phase).sin()
+    });
+    averaged(&values, r)
+}
+
+/// `1/k²` times the acceleration of a link on a spring that `e = sin(kq + phase)` moves the end of:
+/// `ẍ = ω² (e − x) + 2 ζ ω (ė − ẋ)`.
+fn swung(r: &Series, j: usize, [k, frequency]: [f64; 2], phase: f64) -> Vec<f64> {
+    let ((q, v), a) = (r.state(j), r.acceleration(j));
+    let omega = std::f64::consts::TAU * frequency;
+    let h = r.dt / FINE as f64;
+    let mut state: Option<[f64; 2]> = None;
+    let mut step = |q: f64, v: f64, _: f64| {
+        let (sin, cos) = (k * q + phase).sin_cos();
+        let (e, rate) = (sin, k * v * cos);
+        let [x, u] = state.unwrap_or([e, rate]);
+        let a = omega * omega * (e - x) + 2.0 * DAMPING * omega * (rate - u);
+        let u = u + h * a;
+        state = Some([x + h * u, u]);
+        a / (k * k)
+    };
+    // a motion that repeats goes on as it was before
+    if let Some(cycle) = r.cycle {
+        fine_values(&q[..cycle], &v[..cycle], &a[..cycle], r.dt, &mut step);
+    }
+    averaged(&fine_values(q, v, a, r.dt, &mut step), r)
+}
+
+/// Values on the sub-steps of a record as torque is averaged.
+fn averaged(values: &[f64], r: &Series) -> Vec<f64> {
+    let mut out = Vec::with_capacity(r.count);
+    from_fine(values, r.count, &mut out);
+    out
 }

@@ -103,6 +103,9 @@ pub struct Confidence {
     pub alone: Gate,
     /// … and the share of the gap that the effect takes away. Unit: share. Source: by hand.
     pub alone_share: Gate,
+    /// Gain of friction that acts about reversals over that of a larger one of the same joint. Unit: ratio. Source: arms in
+    /// MuJoCo: drag of the lowest exponent beside hysteresis had 0.03 and 0.10.
+    pub beside: Gate,
     /// Share of the unlikeliness of the parameters that a hidden effect takes away. Unit: share. Source: by
     /// hand.
     pub parameters: Gate,
@@ -130,6 +133,7 @@ pub(super) const CONFIDENCE: Confidence = Confidence {
     share: gate(0.55, 0.07),
     alone: gate(0.35, 0.04),
     alone_share: gate(0.15, 0.02),
+    beside: gate(0.25, 0.03),
     parameters: gate(0.7, 0.05),
     holdout: gate(0.3, 0.07),
     repeats: gate(0.45, 0.07),

@@ -6,7 +6,7 @@ use super::super::thresholds::THRESHOLDS as T;
 use super::beside::Beside;
 use super::predict::{predicts, shown_on_both, unsteady};
 use super::rivals::{Rival, against, least_loss, rivals};
-use super::state::State;
+use super::state::{State, others};
 
 /// One effect of the set.
 #[derive(Debug, Clone)]
@@ -97,6 +97,7 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
         * T.confidence.predicts.above(predicted)
         * decoys.map_or(1.0, |d| T.confidence.decoys.below(d))
         * explains_enough(m, rivals)
+        * beside_friction(m)
         * holds(m)
 }
 
@@ -115,6 +116,23 @@ fn explains_enough(m: &Beside, rivals: &[Rival]) -> f64 {
     let best = least_loss(m.st, m.member.effect, rivals);
     let alone = T.confidence.alone.above(best) * T.confidence.alone_share.above(share);
     whole.max(alone)
+}
+
+/// Whether a member that acts about reversals is large enough beside a larger one that does so on the same joint: what the
+/// formula of that one misses is friction about reversals, too.
+fn beside_friction(m: &Beside) -> f64 {
+    let reverses = |c: &Candidate| m.st.effects[c.effect].at_reversals(&c.shape);
+    if !reverses(m.member) {
+        return 1.0;
+    }
+    let beside = |c: &Candidate| reverses(c) && c.place == m.member.place && !c.same(m.member);
+    let gained = |i: usize| m.with.gain - m.st.gain(&others(m.set, i));
+    let larger = (0..m.set.len()).filter(|i| beside(&m.set[*i])).map(gained);
+    let largest = larger.fold(0.0, f64::max);
+    match largest > m.gain {
+        true => T.confidence.beside.above(m.gain / largest),
+        false => 1.0,
+    }
 }
 
 /// Whether it does so on holdout records.

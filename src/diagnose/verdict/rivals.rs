@@ -182,11 +182,12 @@ pub fn against(st: &State, effect: usize, rivals: &[Rival]) -> f64 {
     against
 }
 
-/// Loss of the other effect that comes nearest.
+/// Loss of the other effect that comes nearest, of those that a part of a gap can be given to.
 pub fn least_loss(st: &State, effect: usize, rivals: &[Rival]) -> f64 {
     rivals
         .iter()
         .filter(|r| r.effect != effect && !exchangeable(st, effect, r.effect))
+        .filter(|r| st.effects[r.effect].of_a_part(&r.shape))
         .fold(1.0f64, |m, r| m.min(r.loss))
 }
 
