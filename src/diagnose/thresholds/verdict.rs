@@ -103,8 +103,9 @@ pub struct Confidence {
     pub alone: Gate,
     /// … and the share of the gap that the effect takes away. Unit: share. Source: by hand.
     pub alone_share: Gate,
-    /// Gain of friction that acts about reversals over that of a larger one of the same joint. Unit: ratio. Source: arms in
-    /// MuJoCo: drag of the lowest exponent beside hysteresis had 0.03 and 0.10.
+    /// Gain of friction that acts about reversals, or of torque ahead of the positions, over that of a larger effect of the same
+    /// joint whose formula may miss it. Unit: ratio. Source: drag of the lowest exponent beside hysteresis had 0.03 and 0.10
+    /// in MuJoCo, a delay of −1.3 ms beside a transmission error 0.08.
     pub beside: Gate,
     /// Share of the unlikeliness of the parameters that a hidden effect takes away. Unit: share. Source: by
     /// hand.

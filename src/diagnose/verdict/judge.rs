@@ -97,7 +97,7 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
         * T.confidence.predicts.above(predicted)
         * decoys.map_or(1.0, |d| T.confidence.decoys.below(d))
         * explains_enough(m, rivals)
-        * beside_friction(m)
+        * beside_larger(m)
         * holds(m)
 }
 
@@ -118,16 +118,18 @@ fn explains_enough(m: &Beside, rivals: &[Rival]) -> f64 {
     whole.max(alone)
 }
 
-/// Whether a member that acts about reversals is large enough beside a larger one that does so on the same joint: what the
-/// formula of that one misses is friction about reversals, too.
-fn beside_friction(m: &Beside) -> f64 {
-    let reverses = |c: &Candidate| m.st.effects[c.effect].at_reversals(&c.shape);
-    if !reverses(m.member) {
-        return 1.0;
-    }
-    let beside = |c: &Candidate| reverses(c) && c.place == m.member.place && !c.same(m.member);
+/// Whether a member is large enough beside a larger one of the same joint, where it may be what the formula of that one
+/// misses: friction about reversals beside other such friction, and torque ahead of the positions beside anything.
+fn beside_larger(m: &Beside) -> f64 {
+    let effects = m.st.effects;
+    let reverses = |c: &Candidate| effects[c.effect].at_reversals(&c.shape);
+    let left = !effects[m.member.effect].of_a_part(&m.member.shape);
+    let misses = |c: &Candidate| {
+        let alike = reverses(m.member) && reverses(c);
+        !c.same(m.member) && c.place == m.member.place && (left || alike)
+    };
     let gained = |i: usize| m.with.gain - m.st.gain(&others(m.set, i));
-    let larger = (0..m.set.len()).filter(|i| beside(&m.set[*i])).map(gained);
+    let larger = (0..m.set.len()).filter(|i| misses(&m.set[*i])).map(gained);
     let largest = larger.fold(0.0, f64::max);
     match largest > m.gain {
         true => T.confidence.beside.above(m.gain / largest),
