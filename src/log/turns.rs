@@ -44,7 +44,10 @@ pub(crate) fn unwrap(y: &mut [f64], turn: f64) -> Option<(usize, usize)> {
     let jumps: Vec<usize> = (0..last).filter(|k| step(*k).abs() > 0.5 * turn).collect();
     let like_motion = |k: &usize| {
         let before = k.checked_sub(1).map_or(0.0, |k| rest(k).abs());
-        let after = (k + 1 < last).then(|| rest(k + 1).abs()).unwrap_or(0.0);
+        let after = match k + 1 < last {
+            true => rest(k + 1).abs(),
+            false => 0.0,
+        };
         rest(*k).abs() <= (LARGER * before.max(after) + STILL * turn).min(FASTEST * turn)
     };
     let first = at[*jumps.first()? + 1];

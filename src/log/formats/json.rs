@@ -94,9 +94,9 @@ fn of_whole(whole: Node, path: &Path) -> Result<Table> {
     }
     let mut found = Found::default();
     found.gather("", whole);
-    match (found.arrays.is_empty(), found.rows.pop()) {
+    match found.rows.pop() {
         // a head beside the rows
-        (_, Some(rows)) if found.longest() < rows.len() => of_rows(&rows, path),
+        Some(rows) if found.longest() < rows.len() => of_rows(&rows, path),
         _ => arrays::table(found.arrays, path),
     }
 }

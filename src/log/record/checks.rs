@@ -70,7 +70,7 @@ impl Record {
                         ends[1] - by * TAU,
                         joints[j].name
                     ),
-                    (None, _) => format!("it is a turn or more from the positions: {here}"),
+                    (None, _) => format!("it is more than half a turn from the positions: {here}"),
                 });
             }
             if group == "q" {
