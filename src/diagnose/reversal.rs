@@ -119,6 +119,22 @@ impl Data<'_> {
         self.led(j, self.lead, f)
     }
 
+    /// The same for friction that an effect adds: a torque of the velocity itself, as only the dry friction of a simulator's own
+    /// constraint reverses early. Behind a coarse encoder in motions that do not repeat, that time is not told well and stands
+    /// for more; there the friction of an effect shares it.
+    pub fn added(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+        self.led(j, self.lead_of_effects(j), f)
+    }
+
+    /// The time by which friction that an effect adds is taken to reverse early.
+    pub(super) fn lead_of_effects(&self, j: usize) -> f64 {
+        let mut fitted = self.records.iter().filter(|r| r.fit);
+        match fitted.all(|r| r.filter(j).is_some()) {
+            true => self.lead,
+            false => 0.0,
+        }
+    }
+
     /// Sign of the velocity that the dry friction of actuator `j` feels with a `lead`. A simulator's constraint gives way
     /// by a share of what friction alone decelerates, so over that times the lead its friction turns.
     pub(super) fn dry_sign(&self, j: usize, lead: f64) -> Vec<f64> {

@@ -163,7 +163,7 @@ impl<'a> Context<'a> {
 
     /// Smooth sign of the velocity of an actuator over all records, averaged as torque is.
     pub fn sign(&self, j: usize) -> Vec<f64> {
-        self.data.dry_sign(j, 0.0)
+        self.data.dry_sign(j, self.data.lead_of_effects(j))
     }
 
     /// The same as dry friction of the model feels it: that of a simulator's constraint reverses before the velocity does.

@@ -57,7 +57,7 @@ impl Effect for FrictionAsymmetry {
         if shape.form == 1 {
             all.push(Column::on(
                 j,
-                cx.data.own(j, |_, v| 1.0 - (-v.abs() / shape[0]).exp()),
+                cx.data.added(j, |_, v| 1.0 - (-v.abs() / shape[0]).exp()),
             ));
         }
         all

@@ -45,8 +45,8 @@ impl Effect for PositionDependentFriction {
         let width = 1e-3 * cx.data.speed[j];
         let sign = |v: f64| crate::diagnose::window::sign(v, width);
         vec![
-            Column::on(j, cx.data.own(j, |q, v| (shape[0] * q).sin() * sign(v))),
-            Column::on(j, cx.data.own(j, |q, v| (shape[0] * q).cos() * sign(v))),
+            Column::on(j, cx.data.added(j, |q, v| (shape[0] * q).sin() * sign(v))),
+            Column::on(j, cx.data.added(j, |q, v| (shape[0] * q).cos() * sign(v))),
         ]
     }
 

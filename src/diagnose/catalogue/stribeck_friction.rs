@@ -48,7 +48,7 @@ impl Effect for StribeckFriction {
         let rise = |v: f64| {
             crate::diagnose::window::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
         };
-        vec![Column::on(j, cx.data.own(j, |_, v| rise(v)))]
+        vec![Column::on(j, cx.data.added(j, |_, v| rise(v)))]
     }
 
     // a fit about reversals can ask for many times what slides
