@@ -77,7 +77,7 @@ impl Data<'_> {
         let sharp = T.reversals.sharp * self.speed[j];
         T.reversals.rounded.map(|w| {
             let wide = w * self.speed[j];
-            self.dry(j, |_, v| sign(v, wide) - sign(v, sharp))
+            self.led(j, self.lead, |_, v| sign(v, wide) - sign(v, sharp))
         })
     }
 
@@ -113,14 +113,8 @@ impl Data<'_> {
         }
     }
 
-    /// A function of the position of one actuator and of the velocity that its dry friction feels, averaged as by
-    /// [`Data::own`].
-    fn dry(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
-        self.led(j, self.lead, f)
-    }
-
-    /// The same for friction that an effect adds: a torque of the velocity itself, as only the dry friction of a simulator's own
-    /// constraint reverses early. Behind a coarse encoder in motions that do not repeat, that time is not told well and stands
+    /// A function of the position of one actuator and of the velocity that friction feels which an effect adds, averaged as by
+    /// [`Data::own`]: that is the velocity itself, as only the dry friction of a simulator's own constraint reverses early. Behind a coarse encoder in motions that do not repeat, that time is not told well and stands
     /// for more; there the friction of an effect shares it.
     pub fn added(&self, j: usize, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         self.led(j, self.lead_of_effects(j), f)
@@ -146,7 +140,7 @@ impl Data<'_> {
         })
     }
 
-    /// As [`Data::dry`] with a velocity `q̇ + T q̈` of another `lead` `T`.
+    /// As [`Data::own`] with the velocity `q̇ + T q̈` of a `lead` `T`.
     fn led(&self, j: usize, lead: f64, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
         if lead == 0.0 {
             return self.own(j, f);

@@ -46,9 +46,7 @@ fn periodic(
         .collect();
     for j in 0..n {
         let row = &q[j * count..(j + 1) * count];
-        let mean: Vec<f64> = (0..cycle)
-            .map(|i| (0..periods).map(|p| row[p * cycle + i]).sum::<f64>() / periods as f64)
-            .collect();
+        let mean = mean_period(row, cycle);
         let mut one = [vec![0.0; cycle], vec![0.0; cycle], vec![0.0; cycle]];
         let centre = mean.iter().sum::<f64>() / cycle as f64;
         one[0].fill(centre);
@@ -129,12 +127,17 @@ pub fn likewise(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
     let Some(cycle) = cycle else {
         return low_pass(x, half_width(dt));
     };
-    let periods = (x.len() / cycle).max(1);
-    let at = |i: usize| (0..periods).map(|p| x[p * cycle + i]).sum::<f64>();
-    let mean: Vec<f64> = (0..cycle).map(|i| at(i) / periods as f64).collect();
     let period = cycle as f64 * dt;
-    let [one, ..] = derivatives(&mean, period, lines(cycle, dt));
+    let [one, ..] = derivatives(&mean_period(x, cycle), period, lines(cycle, dt));
     one.iter().copied().cycle().take(x.len()).collect()
+}
+
+/// Mean of the whole periods of a signal.
+fn mean_period(x: &[f64], cycle: usize) -> Vec<f64> {
+    let periods = x.len() / cycle;
+    (0..cycle)
+        .map(|i| (0..periods).map(|p| x[p * cycle + i]).sum::<f64>() / periods as f64)
+        .collect()
 }
 
 /// Harmonics of a motion of this period that are looked at.

@@ -5,6 +5,7 @@ use super::dynamics;
 use super::frame::Frame;
 use super::units::{TURN, fits};
 use crate::error::{Error, Result, Warning};
+use crate::extremes::extremes;
 use crate::log::{Purpose, Record};
 use crate::plant::Plant;
 use crate::robot::Motion;
@@ -19,13 +20,7 @@ pub fn check(plant: &Plant, records: &[Record]) -> Result<Vec<Warning>> {
     let joints = plant.actuators();
     let mut warnings = Vec::new();
     for record in records {
-        let range = |j: usize| {
-            record.q[j]
-                .iter()
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| {
-                    [a.min(x), b.max(x)]
-                })
-        };
+        let range = |j: usize| extremes(&record.q[j]);
         let turns = |j: usize| joints[j].motion == Motion::Revolute;
         let count = joints.len().min(record.q.len());
         let far = (0..count).find(|&j| {

@@ -110,6 +110,15 @@ fn of(path: &Path, plant: &Plant) -> Survey {
     survey(&[path.to_path_buf()], Some(plant)).unwrap()
 }
 
+/// The experiment that is written for what was found, and what it reads.
+fn read_back(found: &Survey, folder: &Path) -> (String, excite::log::Experiment) {
+    let toml = folder.join("experiment.toml");
+    let text = excite::survey::experiment(found, Some("ur5e"), folder);
+    std::fs::write(&toml, &text).unwrap();
+    let read = excite::log::Experiment::read(&toml).unwrap();
+    (text, read)
+}
+
 /// `rostopic echo -p` writes joints in the order of their names, and the names in columns of texts; a Python script may
 /// write lists of both.
 #[test]
@@ -186,10 +195,7 @@ fn a_joint_state_without_a_header_is_read() {
         }
         assert!((found.frames[0].step - 0.004).abs() < 1e-8);
         // the experiment reads what was found
-        let toml = folder.path().join("experiment.toml");
-        let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
-        std::fs::write(&toml, &text).unwrap();
-        let read = excite::log::Experiment::read(&toml).unwrap();
+        let (text, read) = read_back(&found, folder.path());
         assert!((read.records[0].step - 0.004).abs() < 1e-8, "{text}");
         assert_eq!(read.records[0].q[0][9], m.q[0][9]);
     }
@@ -235,10 +241,7 @@ fn angles_that_jump_by_a_turn_are_continuous() {
         "{:?}",
         found.warnings
     );
-    let toml = folder.path().join("experiment.toml");
-    let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
-    std::fs::write(&toml, &text).unwrap();
-    let read = excite::log::Experiment::read(&toml).unwrap();
+    let (_, read) = read_back(&found, folder.path());
     let record = &read.records[0];
     assert!(record.warnings.iter().any(|w| jumps(&w.message)));
     for (j, (read, was)) in record.q.iter().zip(&q).enumerate() {
@@ -291,10 +294,7 @@ fn lines_of_json_are_read() {
     }
     assert!((found.frames[0].step - 0.004).abs() < 1e-8);
     assert_eq!(found.frames[0].rows, m.t.len() - 1);
-    let toml = folder.path().join("experiment.toml");
-    let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
-    std::fs::write(&toml, &text).unwrap();
-    let read = excite::log::Experiment::read(&toml).unwrap();
+    let (text, read) = read_back(&found, folder.path());
     assert_eq!(read.records[0].q[0][9], m.q[0][9], "{text}");
 }
 
@@ -458,10 +458,7 @@ fn files_of_a_quantity_each_are_one_record() {
         assert!((gain / 10.0).ln().abs() < 0.5, "{}: {gain}", c.column);
     }
     // and the experiment that is written is read, with this rate
-    let toml = folder.path().join("experiment.toml");
-    let text = excite::survey::experiment(&found, Some("ur5e"), folder.path());
-    std::fs::write(&toml, &text).unwrap();
-    let read = excite::log::Experiment::read(&toml).unwrap();
+    let (text, read) = read_back(&found, folder.path());
     assert!((read.records[0].step - 0.004).abs() < 1e-9, "{text}");
     for (a, b) in read.records[0].q[0].iter().zip(&m.q[0]) {
         assert_eq!(a, b);

@@ -43,9 +43,38 @@ struct Piece {
 
 /// Lines that are no rows.
 #[derive(Default)]
-struct Left {
-    count: usize,
-    first: Vec<String>,
+pub(super) struct Left {
+    /// how many
+    pub count: usize,
+    /// the first of them, with what is wrong
+    pub first: Vec<String>,
+}
+
+impl Left {
+    /// Names another one, of which `what` says what is wrong, while few are named.
+    pub(super) fn name(&mut self, what: impl FnOnce() -> String) {
+        if self.first.len() < NAMED {
+            self.first.push(what());
+        }
+    }
+
+    /// That they were left out.
+    pub(super) fn warning(&self, path: &Path) -> Warning {
+        let count = match self.count {
+            1 => "1 line is no row and was".to_string(),
+            n => format!("{n} lines are no rows and were"),
+        };
+        let first = self.first.join("; ");
+        let more = match self.count > self.first.len() {
+            true => "; …",
+            false => "",
+        };
+        Warning::new(
+            WarningKind::RowsLeftOut,
+            path.display().to_string(),
+            format!("{count} left out: {first}{more}"),
+        )
+    }
 }
 
 /// Reads a file; columns for which `wanted` is false are not kept (their column is empty). `check`
@@ -201,21 +230,7 @@ pub(crate) fn read_parts<T>(
             );
             return Err(Error::file(path, "", message));
         }
-        let more = match left.count > left.first.len() {
-            true => "; …",
-            false => "",
-        };
-        table.warnings.push(Warning::new(
-            WarningKind::RowsLeftOut,
-            path.display().to_string(),
-            format!(
-                "{} left out: {first}{more}",
-                match left.count {
-                    1 => "1 line is no row and was".to_string(),
-                    n => format!("{n} lines are no rows and were"),
-                }
-            ),
-        ));
+        table.warnings.push(left.warning(path));
     }
     if rows == 0 && keep.contains(&true) {
         return Err(no_numbers(path, &[]));
@@ -427,11 +442,10 @@ fn append(
         }
         left.count += p.count;
         for bad in p.bad {
-            if left.first.len() < NAMED {
+            left.name(|| {
                 let message = explain(&bad.message, &dialect.names);
-                left.first
-                    .push(format!("line {}: {message}", *line + bad.line));
-            }
+                format!("line {}: {message}", *line + bad.line)
+            });
         }
         *line += p.lines;
     }

@@ -9,8 +9,9 @@
 //! A text that stays the same in all rows is a label, as `name[0]` beside `position[0]`; a date is a number of seconds.
 
 use super::arrays::{self, Array};
-use super::{csv, dialect};
-use crate::error::{Error, Result, Warning, WarningKind};
+use super::csv::{self, Left};
+use super::dialect;
+use crate::error::{Error, Result};
 use crate::log::Table;
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use std::collections::HashMap;
@@ -19,8 +20,6 @@ use std::path::Path;
 
 /// Columns at the most.
 const COLUMNS: usize = 10_000;
-/// Lines that are no rows and are named with what is wrong.
-const NAMED: usize = 3;
 
 /// Whether a text begins as an object, or as a list of objects, and not as a cell of a table.
 pub(super) fn begins(head: &[u8]) -> bool {
@@ -33,35 +32,40 @@ pub(super) fn begins(head: &[u8]) -> bool {
 
 pub(super) fn read(path: &Path) -> Result<Table> {
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-    let lines = || {
-        let all = text.lines().enumerate();
-        all.filter(|(_, line)| !line.trim().is_empty())
+    let mut lines = (text.lines().enumerate()).filter(|(_, line)| !line.trim().is_empty());
+    let (first, second) = (lines.next(), lines.next());
+    let row = |line: &str| match serde_json::from_str(line) {
+        Ok(row @ Node::Object(_)) => Ok(row),
+        Ok(_) => Err("it is no object".to_string()),
+        Err(e) => Err(e.to_string()),
     };
-    let parsed = |text: &str| serde_json::from_str::<Node>(text);
-    let first = lines().next().map(|(_, line)| parsed(line));
-    let mut table = match first {
-        Some(Ok(Node::Object(_))) if lines().nth(1).is_some() => {
+    let several = second.is_some() && first.is_some_and(|(_, line)| row(line).is_ok());
+    let mut table = match several {
+        true => {
             let mut rows = Rows::default();
-            let mut left = Vec::new();
-            for (i, line) in lines() {
-                match parsed(line) {
-                    Ok(row @ Node::Object(_)) => rows.push(&row, path)?,
-                    Ok(_) => left.push(format!("line {}: it is no object", i + 1)),
-                    Err(e) => left.push(format!("line {}: {e}", i + 1)),
+            let mut left = Left::default();
+            for (i, line) in first.into_iter().chain(second).chain(lines) {
+                match row(line) {
+                    Ok(row) => rows.push(&row, path)?,
+                    Err(what) => {
+                        left.count += 1;
+                        left.name(|| format!("line {}: {what}", i + 1));
+                    }
                 }
             }
-            let all = rows.count + left.len();
+            let count = rows.count;
             let mut table = rows.table();
-            if let Some(first) = left.first() {
-                if 2 * left.len() > all {
-                    let message = format!("{} of {all} lines are no JSON; {first}", left.len());
+            if let Some(first) = left.first.first() {
+                if left.count > count {
+                    let all = left.count + count;
+                    let message = format!("{} of {all} lines are no JSON; {first}", left.count);
                     return Err(Error::file(path, "", message));
                 }
-                table.warnings.push(left_out(&left, path));
+                table.warnings.push(left.warning(path));
             }
             table
         }
-        _ => match parsed(&text) {
+        false => match serde_json::from_str(&text) {
             Ok(whole) => of_whole(whole, path)?,
             Err(e) => {
                 let at = format!("line {}", e.line());
@@ -71,20 +75,6 @@ pub(super) fn read(path: &Path) -> Result<Table> {
     };
     csv::whole_stamp(&mut table);
     Ok(table)
-}
-
-fn left_out(left: &[String], path: &Path) -> Warning {
-    let count = match left.len() {
-        1 => "1 line is no row and was".to_string(),
-        n => format!("{n} lines are no rows and were"),
-    };
-    let more = if left.len() > NAMED { "; …" } else { "" };
-    let first = left[..left.len().min(NAMED)].join("; ");
-    Warning::new(
-        WarningKind::RowsLeftOut,
-        path.display().to_string(),
-        format!("{count} left out: {first}{more}"),
-    )
 }
 
 /// A list of rows, or an object that holds columns or one list of rows.
