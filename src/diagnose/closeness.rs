@@ -17,15 +17,18 @@
 //! likeliest the loosest are taken. Energies are divided by what the refitted
 //! model leaves per row, so that a gap for which no effect stands does not count as precision.
 
-use super::catalogue::{Context, Effect};
+use super::catalogue::{Context, Effect, Place, Shape};
 use super::data::Data;
-use super::evidence::{Evidence, Projected};
+use super::evidence::Evidence;
 use super::prior::{Closeness, factors};
 use super::thresholds::THRESHOLDS as T;
 use crate::robot::Prior;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use rayon::prelude::*;
+
+/// Sets of columns that are projected at once.
+const AT_ONCE: usize = 8;
 
 /// Residual, model and one set of columns as the parameters see them, in units of the prior.
 struct Reduced {
@@ -56,36 +59,40 @@ pub fn tighten(data: &mut Data, effects: &[Box<dyn Effect>]) -> crate::error::Re
 /// The factors that the records find likeliest.
 fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Closeness {
     let data = evidence.data;
-    let sets: Vec<(f64, Vec<_>)> = effects
-        .iter()
-        .filter(|e| e.hides())
+    let hidden = effects.iter().filter(|e| e.hides());
+    let tasks: Vec<(&dyn Effect, Place, Shape)> = hidden
         .flat_map(|e| {
             e.sites(cx).into_iter().flat_map(move |place| {
                 let shapes = e.shapes(cx, &place);
-                shapes
-                    .into_iter()
-                    .map(move |shape| (e.prior(), e.columns(cx, &place, &shape, true)))
+                shapes.into_iter().map(move |s| (e.as_ref(), place, s))
             })
         })
-        .filter(|(_, c)| !c.is_empty() && c.iter().all(|c| !c.rows.is_empty()))
         .collect();
-    let (priors, sets): (Vec<f64>, Vec<_>) = sets.into_iter().unzip();
     let samples = (data.fitted * data.joints()) as f64;
     let level = (evidence.j0 / samples).max(1.0);
-    let mut projected: Vec<Projected> = sets
-        .par_chunks(8)
-        .flat_map_iter(|c| evidence.project_all(c))
-        .collect();
-    let of = projected.iter_mut().zip(priors);
-    of.for_each(|(p, prior)| p.prior = prior);
+    // a few at a time, and no longer than their products are wanted: columns are large
+    let seen = |tasks: &[(&dyn Effect, Place, Shape)]| -> Vec<[Mat<f64>; 3]> {
+        let of = |(e, place, s): &(&dyn Effect, Place, Shape)| {
+            let columns = e.columns(cx, place, s, true);
+            let empty = columns.is_empty() || columns.iter().any(|c| c.rows.is_empty());
+            (!empty).then_some((e.prior(), columns))
+        };
+        let (priors, sets): (Vec<f64>, Vec<_>) = tasks.iter().filter_map(of).unzip();
+        let projected = evidence.project_all(&sets).into_iter().zip(priors);
+        projected
+            .map(|(mut p, prior)| {
+                p.prior = prior;
+                evidence.as_seen(&p).map(|m| m * (1.0 / level))
+            })
+            .collect()
+    };
+    let each = tasks.par_chunks(AT_ONCE).with_max_len(1).map(seen);
+    let each: Vec<Vec<[Mat<f64>; 3]>> = each.collect();
     let [gram, pull] = evidence.normal_equations();
     let reduced = Reduced {
         gram: gram * (1.0 / level),
         pull: pull * (1.0 / level),
-        effects: projected
-            .iter()
-            .map(|p| evidence.as_seen(p).map(|m| m * (1.0 / level)))
-            .collect(),
+        effects: each.into_iter().flatten().collect(),
     };
     let scales = T.closeness.scales;
     let pairs: Vec<Closeness> = scales

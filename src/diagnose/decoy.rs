@@ -66,12 +66,8 @@ pub fn largest(
         let of = |c| moved(evidence.data, c, share);
         columns.iter().map(of).collect()
     };
-    let before = evidence.fit(beside).gain;
-    let gain = |decoy: &Projected| {
-        let mut set = beside.to_vec();
-        set.push(decoy);
-        evidence.fit(&set).gain - before
-    };
+    let beside = evidence.set(beside);
+    let gain = |decoy: &Projected| beside.with(decoy).gain - beside.gain();
     let excess = |d: &Projected| gain(d) / own.max(1e-9) - evidence.overlap(projected, eta, d);
     // a few at a time: decoys of many columns are large
     let all: Vec<f64> = shifts().collect();

@@ -27,6 +27,7 @@ use super::data::Data;
 use algebra::{dot, overlap};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
+use rayon::prelude::*;
 
 /// Columns of an effect, whitened and reduced by the nominal model.
 #[derive(Debug, Clone)]
@@ -46,6 +47,20 @@ pub struct Projected {
 }
 
 impl Projected {
+    /// `Λ_e` with the information a priori. What is not visible must not be fitted: a ridge far below anything visible.
+    fn ridged(&self) -> Mat<f64> {
+        let mut s = self.s.clone();
+        for x in 0..self.z.len() {
+            s[(x, x)] += 1e-7 * self.raw[(x, x)] + 1e-9 + self.prior;
+        }
+        s
+    }
+
+    /// Forgets the rows, so that nothing can be fitted beside it; its energies stay.
+    pub fn forget(&mut self) {
+        self.z.iter_mut().for_each(|c| c.rows = Vec::new());
+    }
+
     /// `ηᵀ Λ_e η` and `ηᵀZᵀZη`: energy of the effect that is left, and all of it.
     pub fn energy(&self, eta: &[f64]) -> (f64, f64) {
         let k = self.z.len().min(eta.len());
@@ -86,6 +101,49 @@ pub struct Fit {
     pub covariance: Vec<Vec<f64>>,
 }
 
+/// A set of effects that others are fitted beside.
+pub struct Set<'a> {
+    evidence: &'a Evidence<'a>,
+    members: Vec<&'a Projected>,
+    /// their `S` and `b`
+    s: Mat<f64>,
+    b: Vec<f64>,
+    gain: f64,
+}
+
+impl Set<'_> {
+    /// The records and the nominal model.
+    pub fn evidence(&self) -> &Evidence<'_> {
+        self.evidence
+    }
+
+    /// By how much `χ²` falls with it.
+    pub fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// Fit with one more, whose coefficients are the last ones.
+    pub fn with(&self, more: &Projected) -> Fit {
+        let (first, own) = (self.b.len(), more.z.len());
+        let mut s = Mat::zeros(first + own, first + own);
+        s.submatrix_mut(0, 0, first, first).copy_from(&self.s);
+        s.submatrix_mut(first, first, own, own)
+            .copy_from(more.ridged());
+        let mut at = 0;
+        for a in &self.members {
+            let cross = self.evidence.cross(more, a);
+            for x in 0..cross.nrows() {
+                for y in 0..cross.ncols() {
+                    s[(first + x, at + y)] = cross[(x, y)];
+                    s[(at + y, first + x)] = cross[(x, y)];
+                }
+            }
+            at += a.z.len();
+        }
+        solve(&s, &[&self.b[..], &more.b].concat())
+    }
+}
+
 /// Energies of a fit on records.
 #[derive(Debug, Clone, Default)]
 pub struct Energy {
@@ -113,8 +171,10 @@ pub struct Evidence<'a> {
     pub data: &'a Data<'a>,
     /// nominal parameters
     pub phi: Vec<f64>,
-    /// `Q` by actuator, rows of all records
+    /// `Q` by actuator, rows of all records; from its first column on that is not zero
     q: Vec<Mat<f64>>,
+    /// that column
+    first: Vec<usize>,
     /// `L`
     l: Mat<f64>,
     /// whitened residual of the frozen model by actuator, rows of all records
@@ -198,38 +258,44 @@ impl Evidence<'_> {
     pub fn project_all(&self, sets: &[Vec<Column>]) -> Vec<Projected> {
         let fitted = self.data.fitted;
         let p = self.d.len();
-        let z: Vec<Vec<Column>> = sets
-            .iter()
-            .map(|columns| {
-                let whiten = |c: &Column| Column {
-                    rows: c
-                        .rows
-                        .iter()
-                        .map(|(j, v)| (*j, self.data.modelled(*j, v)))
-                        .collect(),
-                };
-                columns.iter().map(whiten).collect()
-            })
+        let modelled = |c: &Column| Column {
+            rows: (c.rows.par_iter().with_max_len(1))
+                .map(|(j, v)| (*j, self.data.modelled(*j, v)))
+                .collect(),
+        };
+        let z: Vec<Vec<Column>> = (sets.par_iter().with_max_len(1))
+            .map(|columns| columns.par_iter().map(modelled).collect())
             .collect();
         let flat: Vec<&Column> = z.iter().flatten().collect();
         let mut c = Mat::<f64>::zeros(p, flat.len());
         let mut b = vec![0.0; flat.len()];
-        for j in 0..self.data.joints() {
-            let here: Vec<(usize, &[f64])> = flat
-                .iter()
-                .enumerate()
+        // of every actuator by itself: the columns on its rows, their products with Q and with the residual
+        let of = |j: usize| {
+            let at = flat.iter().enumerate();
+            let here: Vec<(usize, &[f64])> = at
                 .filter_map(|(i, c)| Some((i, &c.get(j)?[..fitted])))
                 .collect();
-            if here.is_empty() {
-                continue;
-            }
-            let block = Mat::from_fn(fitted, here.len(), |r, i| here[i].1[r]);
-            let part = self.q[j].subrows(0, fitted).transpose() * &block;
-            for (k, (i, v)) in here.iter().enumerate() {
-                for m in 0..p {
-                    c[(m, *i)] += part[(m, k)];
+            let q = self.q[j].subrows(0, fitted);
+            let part = match here[..] {
+                [] => Mat::zeros(q.ncols(), 0),
+                [(_, v)] => q.transpose() * faer::ColRef::from_slice(v).as_mat(),
+                _ => {
+                    let block = Mat::from_fn(fitted, here.len(), |r, i| here[i].1[r]);
+                    q.transpose() * &block
                 }
-                b[*i] += dot(v, &self.r[j][..fitted]);
+            };
+            let r = &self.r[j][..fitted];
+            let here = here.into_iter().map(|(i, v)| (i, dot(v, r)));
+            (here.collect::<Vec<_>>(), part, self.first[j])
+        };
+        let joints = (0..self.data.joints()).into_par_iter().with_max_len(1);
+        let parts: Vec<(Vec<(usize, f64)>, Mat<f64>, usize)> = joints.map(of).collect();
+        for (here, part, first) in parts {
+            for (k, (i, product)) in here.into_iter().enumerate() {
+                for m in first..p {
+                    c[(m, i)] += part[(m - first, k)];
+                }
+                b[i] += product;
             }
         }
         for (i, b) in b.iter_mut().enumerate() {
@@ -274,20 +340,29 @@ impl Evidence<'_> {
 
     /// Fits a set of effects together.
     pub fn fit(&self, set: &[&Projected]) -> Fit {
-        let mut s = assembled(set, |i, m| match i == m {
-            true => set[i].s.clone(),
+        let (s, b) = self.normal(set);
+        solve(&s, &b)
+    }
+
+    /// `S` and `b` of a set.
+    fn normal(&self, set: &[&Projected]) -> (Mat<f64>, Vec<f64>) {
+        let s = assembled(set, |i, m| match i == m {
+            true => set[i].ridged(),
             false => self.cross(set[i], set[m]),
         });
-        let mut b = Vec::with_capacity(s.nrows());
-        for a in set {
-            let at = b.len();
-            // what is not visible must not be fitted: a ridge far below anything visible
-            for x in 0..a.z.len() {
-                s[(at + x, at + x)] += 1e-7 * a.raw[(x, x)] + 1e-9 + a.prior;
-            }
-            b.extend(a.b.iter().copied());
+        (s, set.iter().flat_map(|a| a.b.iter().copied()).collect())
+    }
+
+    /// A set that others are fitted beside.
+    pub fn set<'a>(&'a self, members: &[&'a Projected]) -> Set<'a> {
+        let (s, b) = self.normal(members);
+        Set {
+            evidence: self,
+            members: members.to_vec(),
+            gain: solve(&s, &b).gain,
+            s,
+            b,
         }
-        solve(&s, &b)
     }
 
     /// Share of effect `a` with coefficients `eta` that effect `b` can imitate once the nominal model

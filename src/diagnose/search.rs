@@ -2,7 +2,7 @@
 
 use super::catalogue::{Context, Effect, Place, Shape};
 use super::column::Column;
-use super::evidence::{Evidence, Fit, Projected};
+use super::evidence::{Evidence, Projected, Set};
 use super::thresholds::THRESHOLDS as T;
 use crate::report::format::significant;
 use rayon::prelude::*;
@@ -39,48 +39,26 @@ impl Candidate {
     }
 }
 
-/// Gain of one shape beside a fitted set.
-#[allow(clippy::too_many_arguments)]
-fn try_shape(
-    evidence: &Evidence,
-    cx: &Context,
-    effect: &dyn Effect,
-    place: &Place,
-    shape: &Shape,
-    beside: &[&Projected],
-    before: &Fit,
-    draft: bool,
-) -> Option<Tried> {
-    let columns = effect.columns(cx, place, shape, draft);
-    if columns.is_empty() || columns.iter().any(|c| c.rows.is_empty()) {
-        return None;
-    }
-    let mut projected = evidence.project(&columns);
-    projected.prior = effect.prior();
-    let mut set = beside.to_vec();
-    set.push(&projected);
-    let fit = evidence.fit(&set);
-    let eta = fit.eta[fit.eta.len() - columns.len()..].to_vec();
-    let gain = fit.gain - before.gain;
-    let able = gain.is_finite() && effect.plausible(cx, place, shape, &eta);
-    let why = match able {
-        true => impossible(cx, effect, place, shape, &eta, (!draft).then_some(&columns)),
-        false => None,
-    };
-    Some(Tried {
-        gain: if able && why.is_none() { gain } else { 0.0 },
-        ruled_out: why.map(|why| (why, gain)),
-        eta,
-        projected,
-    })
-}
-
-/// An effect with one shape, beside a set.
+/// One shape of an effect, beside a set.
 struct Tried {
+    /// by how much `χ²` falls
     gain: f64,
     eta: Vec<f64>,
     projected: Projected,
-    ruled_out: Option<(String, f64)>,
+    /// whether the coefficients make sense
+    able: bool,
+    /// why no machine has them
+    why: Option<String>,
+}
+
+impl Tried {
+    /// What it gains, nothing where it can not be.
+    fn counts(&self) -> f64 {
+        match self.able && self.why.is_none() {
+            true => self.gain,
+            false => 0.0,
+        }
+    }
 }
 
 /// Why no machine has these coefficients: by the rules of the effect, or because it would need more torque than
@@ -119,191 +97,257 @@ fn impossible(
     })
 }
 
-/// A shape refined with the whole columns, in small steps.
-fn whole(
-    evidence: &Evidence,
-    cx: &Context,
-    effect: &dyn Effect,
-    place: &Place,
-    from: (Tried, Shape),
-    beside: &[&Projected],
-    before: &Fit,
-) -> (Tried, Shape) {
-    let (mut last, mut shape) = from;
-    for step in T.settle.steps {
-        for k in (0..shape.constants.len()).filter(|k| effect.refinable(*k)) {
-            for factor in [step, 1.0 / step] {
-                for _ in 0..T.settle.most {
-                    let mut next = shape.clone();
-                    next.constants[k] *= factor;
-                    match try_shape(evidence, cx, effect, place, &next, beside, before, false) {
-                        Some(t) if t.gain > last.gain * T.shapes.better => {
-                            (last, shape) = (t, next);
-                        }
-                        _ => break,
-                    }
-                }
-            }
-        }
+/// Looks for shapes beside a set.
+#[derive(Clone, Copy)]
+pub struct Finder<'a> {
+    /// what columns are made from
+    pub cx: &'a Context<'a>,
+    /// the catalogue
+    pub effects: &'a [Box<dyn Effect>],
+    /// the set
+    pub beside: &'a Set<'a>,
+}
+
+/// An effect of the catalogue, and where.
+pub type Task = (usize, Place);
+
+/// The best shape of an effect at a place among those of its grid.
+struct Sketch {
+    task: Task,
+    grid: Vec<Shape>,
+    shape: Shape,
+    /// by how much `χ²` falls
+    gain: f64,
+    /// a shape that no machine can have and that would gain more: why, and how much
+    said: Option<(String, f64)>,
+}
+
+impl Finder<'_> {
+    fn effect(&self, task: Task) -> &dyn Effect {
+        self.effects[task.0].as_ref()
     }
-    (last, shape)
-}
 
-/// A candidate in another context, its shape refined from where it is.
-pub fn again(
-    evidence: &Evidence,
-    cx: &Context,
-    effects: &[Box<dyn Effect>],
-    c: &Candidate,
-) -> Option<Candidate> {
-    let (effect, none) = (effects[c.effect].as_ref(), evidence.fit(&[]));
-    let first = try_shape(evidence, cx, effect, &c.place, &c.shape, &[], &none, false)?;
-    let from = (first, c.shape.clone());
-    let (last, shape) = whole(evidence, cx, effect, &c.place, from, &[], &none);
-    Some(Candidate {
-        shape,
-        projected: last.projected,
-        gain: last.gain,
-        eta: last.eta,
-        ruled_out: last.ruled_out,
-        ..c.clone()
-    })
-}
-
-/// The best shape of an effect at a place, beside a set.
-pub fn best_shape(
-    evidence: &Evidence,
-    cx: &Context,
-    effects: &[Box<dyn Effect>],
-    which: usize,
-    place: &Place,
-    beside: &[&Projected],
-    before: &Fit,
-) -> Option<Candidate> {
-    let effect = effects[which].as_ref();
-    let grid = effect.shapes(cx, place);
-    // the best that a machine can have, and the best that none can: by what they gain less what their columns cost, so that
-    // a form with more of them takes the place of a plain one only where it has a use
-    type Best = [Option<(f64, f64, Shape, Option<String>)>; 2];
-    let worth = |gain: f64, projected: &Projected| {
-        let live = (0..projected.z.len()).filter(|k| projected.raw[(*k, *k)] > 0.0);
-        gain - T.rivals.price * live.count() as f64
-    };
-    let best_of = |shapes: &[Shape]| -> Option<Best> {
-        let columns = |s: &Shape| effect.columns(cx, place, s, true);
-        let sets: Vec<_> = shapes.iter().map(columns).collect();
+    /// Several shapes; none where one of them has nothing to show.
+    fn tried(&self, task: Task, shapes: &[Shape], draft: bool) -> Option<Vec<Tried>> {
+        let (cx, effect, place) = (self.cx, self.effect(task), &task.1);
+        let sets = match draft {
+            true => effect.drafts(cx, place, shapes),
+            false => (shapes.iter())
+                .map(|s| effect.columns(cx, place, s, false))
+                .collect(),
+        };
         let empty = |s: &Vec<Column>| s.is_empty() || s.iter().any(|c| c.rows.is_empty());
         if sets.iter().any(empty) {
             return None;
         }
-        let mut best: Best = [None, None];
-        for (mut projected, shape) in evidence.project_all(&sets).into_iter().zip(shapes) {
+        let projected = self.beside.evidence().project_all(&sets);
+        let all = projected.into_iter().zip(sets.iter().zip(shapes));
+        let of = |(mut projected, (columns, shape)): (Projected, (&Vec<Column>, &Shape))| {
             projected.prior = effect.prior();
-            let mut set = beside.to_vec();
-            set.push(&projected);
-            let fit = evidence.fit(&set);
-            let eta = &fit.eta[fit.eta.len() - projected.z.len()..];
-            let gain = fit.gain - before.gain;
-            let able = gain.is_finite() && effect.plausible(cx, place, shape, eta);
-            let why = effect.impossible(cx, place, shape, eta).filter(|_| able);
-            let of = &mut best[usize::from(why.is_some())];
-            let worth = worth(gain, &projected);
-            if able && of.as_ref().is_none_or(|b| worth > b.0) {
-                *of = Some((worth, gain, shape.clone(), why));
+            let fit = self.beside.with(&projected);
+            let eta = fit.eta[fit.eta.len() - columns.len()..].to_vec();
+            let gain = fit.gain - self.beside.gain();
+            let able = gain.is_finite() && effect.plausible(cx, place, shape, &eta);
+            let columns = (!draft).then_some(columns);
+            let why = (able.then(|| impossible(cx, effect, place, shape, &eta, columns))).flatten();
+            Tried {
+                gain,
+                eta,
+                projected,
+                able,
+                why,
             }
-        }
-        Some(best)
-    };
-    let parts: Vec<_> = grid.par_chunks(8).with_max_len(1).map(best_of).collect();
-    let [best, none] = [0, 1].map(|which| {
-        let all = parts.iter().flatten().filter_map(|b| b[which].clone());
-        all.reduce(|a, b| if b.0 > a.0 { b } else { a })
-    });
-    // what no machine can have is kept only to be said
-    let gain = best.as_ref().map_or(0.0, |b| b.1);
-    let said =
-        none.and_then(|(_, more, shape, why)| (more > gain).then_some(((why?, more), shape)));
-    let (said, instead) = said.unzip();
-    let mut shape = best.map(|b| b.2).or(instead)?;
-    // between grid points
-    if gain > T.shapes.refined {
-        let mut top = gain;
-        let constants = shape.constants.len();
-        let bounds: Vec<[f64; 2]> = (0..constants)
-            .map(|k| {
-                let ends = grid
-                    .iter()
-                    .filter(|s| s.form == shape.form)
-                    .map(|s| s[k])
-                    .filter(|v| v.signum() == shape[k].signum());
-                ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
-                    [a.min(v.abs()), b.max(v.abs())]
-                })
-            })
-            .collect();
-        for step in T.shapes.steps {
-            for k in 0..constants {
-                if !effect.refinable(k) {
-                    continue;
-                }
+        };
+        Some(all.map(of).collect())
+    }
+
+    /// One shape with its whole columns.
+    fn whole(&self, task: Task, shape: &Shape) -> Option<Tried> {
+        self.tried(task, std::slice::from_ref(shape), false)?.pop()
+    }
+
+    /// A shape refined with the whole columns, in small steps.
+    fn settled(&self, task: Task, (mut last, mut shape): (Tried, Shape)) -> (Tried, Shape) {
+        let effect = self.effect(task);
+        for step in T.settle.steps {
+            for k in (0..shape.constants.len()).filter(|k| effect.refinable(*k)) {
                 for factor in [step, 1.0 / step] {
-                    loop {
+                    let from = shape.clone();
+                    for _ in 0..T.settle.most {
                         let mut next = shape.clone();
                         next.constants[k] *= factor;
-                        if next[k].abs() < bounds[k][0] / T.shapes.below
-                            || next[k].abs() > bounds[k][1] * T.shapes.above
-                        {
-                            break;
-                        }
-                        let tried =
-                            try_shape(evidence, cx, effect, place, &next, beside, before, true);
-                        match tried {
-                            Some(t) if t.gain > top * T.shapes.better => {
-                                top = t.gain;
-                                shape = next;
+                        match self.whole(task, &next) {
+                            Some(t) if t.counts() > last.counts() * T.shapes.better => {
+                                (last, shape) = (t, next);
                             }
                             _ => break,
                         }
                     }
+                    // what rises on one side falls on the other
+                    if shape != from {
+                        break;
+                    }
+                }
+            }
+        }
+        (last, shape)
+    }
+
+    /// The best shape of a grid.
+    fn sketch(&self, task: Task) -> Option<Sketch> {
+        let grid = self.effect(task).shapes(self.cx, &task.1);
+        // the best that a machine can have, and the best that none can: by what they gain less what their columns cost, so that
+        // a form with more of them takes the place of a plain one only where it has a use
+        type Best = [Option<(f64, f64, Shape, Option<String>)>; 2];
+        let best_of = |shapes: &[Shape]| -> Option<Best> {
+            let mut best: Best = [None, None];
+            let tried = self.tried(task, shapes, true)?;
+            for (tried, shape) in tried.into_iter().zip(shapes).filter(|t| t.0.able) {
+                let raw = &tried.projected.raw;
+                let live = (0..raw.nrows()).filter(|k| raw[(*k, *k)] > 0.0).count();
+                let worth = tried.gain - T.rivals.price * live as f64;
+                let of = &mut best[usize::from(tried.why.is_some())];
+                if of.as_ref().is_none_or(|b| worth > b.0) {
+                    *of = Some((worth, tried.gain, shape.clone(), tried.why));
+                }
+            }
+            Some(best)
+        };
+        let parts: Vec<_> = grid.par_chunks(8).with_max_len(1).map(best_of).collect();
+        let [best, none] = [0, 1].map(|which| {
+            let all = parts.iter().flatten().filter_map(|b| b[which].clone());
+            all.reduce(|a, b| if b.0 > a.0 { b } else { a })
+        });
+        // what no machine can have is kept only to be said
+        let gain = best.as_ref().map_or(0.0, |b| b.1);
+        let said =
+            none.and_then(|(_, more, shape, why)| (more > gain).then_some(((why?, more), shape)));
+        let (said, instead) = said.unzip();
+        Some(Sketch {
+            task,
+            shape: best.map(|b| b.2).or(instead)?,
+            grid,
+            gain,
+            said,
+        })
+    }
+
+    /// The shape between the points of the grid: to the best neighbour as long as one is better.
+    fn between(&self, s: &mut Sketch) {
+        let effect = self.effect(s.task);
+        let of = |k: usize| {
+            let ends = (s.grid.iter())
+                .filter(|g| g.form == s.shape.form)
+                .map(|g| g[k])
+                .filter(|v| v.signum() == s.shape[k].signum());
+            let [a, b] = ends.fold([f64::INFINITY, 0.0], |[a, b]: [f64; 2], v| {
+                [a.min(v.abs()), b.max(v.abs())]
+            });
+            (k, a / T.shapes.below..=b * T.shapes.above)
+        };
+        let constants = (0..s.shape.constants.len()).filter(|k| effect.refinable(*k));
+        let bounds: Vec<_> = constants.map(of).collect();
+        for step in T.shapes.steps {
+            // not back to where it came from
+            let mut came: Option<(usize, f64)> = None;
+            loop {
+                let factors = |k: usize| [(k, step), (k, 1.0 / step)];
+                let moves = bounds.iter().flat_map(|(k, _)| factors(*k));
+                let moves = moves.filter(|m| came.is_none_or(|c| c.0 != m.0 || c.1 == m.1));
+                let (moves, shapes): (Vec<_>, Vec<_>) = moves
+                    .filter_map(|(k, factor)| {
+                        let mut next = s.shape.clone();
+                        next.constants[k] *= factor;
+                        let bounds = &bounds.iter().find(|b| b.0 == k)?.1;
+                        bounds.contains(&next[k].abs()).then_some(((k, factor), next))
+                    })
+                    .unzip();
+                let tried = match shapes.is_empty() {
+                    true => None,
+                    false => self.tried(s.task, &shapes, true),
+                };
+                let all = tried.into_iter().flatten().map(|t| t.counts());
+                let best = (all.zip(moves).zip(shapes))
+                    .reduce(|a, b| if b.0.0 > a.0.0 { b } else { a });
+                match best {
+                    Some(((gain, by), next)) if gain > s.gain * T.shapes.better => {
+                        (s.gain, s.shape, came) = (gain, next, Some(by));
+                    }
+                    _ => break,
                 }
             }
         }
     }
-    let last = try_shape(evidence, cx, effect, place, &shape, beside, before, false)?;
-    // a draft leaves out what gravity and velocity do to a way
-    let (last, shape) = match effect.sways() && last.gain > T.settle.whole {
-        true => whole(evidence, cx, effect, place, (last, shape), beside, before),
-        false => (last, shape),
-    };
-    Some(Candidate {
-        effect: which,
-        place: *place,
-        shape,
-        projected: last.projected,
-        gain: last.gain,
-        eta: last.eta,
-        ruled_out: last.ruled_out.or(said),
-    })
+
+    /// The candidate that a sketch becomes, with its whole columns; where its gain is near the `most` of others, between the points
+    /// of the grid.
+    fn candidate(&self, mut s: Sketch, most: f64) -> Option<Candidate> {
+        let near = s.gain >= T.shapes.near * most;
+        if near && s.gain > T.shapes.refined {
+            self.between(&mut s);
+        }
+        let last = self.whole(s.task, &s.shape)?;
+        // a draft leaves out what gravity and velocity do to a way
+        let large = last.counts() > T.settle.whole;
+        let (last, shape) = match near && self.effect(s.task).sways() && large {
+            true => self.settled(s.task, (last, s.shape)),
+            false => (last, s.shape),
+        };
+        let mut found = candidate(s.task, last, shape);
+        found.ruled_out = found.ruled_out.or(s.said);
+        Some(found)
+    }
+
+    /// The best shape of an effect at a place.
+    pub fn best_shape(&self, task: Task) -> Option<Candidate> {
+        self.candidate(self.sketch(task)?, 0.0)
+    }
+
+    /// The best shapes of effects at places. Those that gain little beside the best one stay at a point of their grid.
+    pub fn best_shapes(&self, tasks: &[Task]) -> Vec<Candidate> {
+        let sketches = tasks.par_iter().with_max_len(1);
+        let sketches: Vec<Sketch> = sketches.filter_map(|t| self.sketch(*t)).collect();
+        let most = sketches.iter().fold(0.0f64, |m, s| m.max(s.gain));
+        let all = sketches.into_par_iter().with_max_len(1);
+        all.filter_map(|s| self.candidate(s, most)).collect()
+    }
+
+    /// A candidate of another context, its shape refined from where it is.
+    pub fn again(&self, c: &Candidate) -> Option<Candidate> {
+        let task = (c.effect, c.place);
+        let first = self.whole(task, &c.shape)?;
+        let (last, shape) = self.settled(task, (first, c.shape.clone()));
+        Some(candidate(task, last, shape))
+    }
 }
 
-/// Every effect at every place with its best shape, beside a set; by falling gain.
-pub fn singles(
-    evidence: &Evidence,
-    cx: &Context,
-    effects: &[Box<dyn Effect>],
-    beside: &[&Projected],
-) -> Vec<Candidate> {
-    let before = evidence.fit(beside);
-    let tasks: Vec<(usize, Place)> = effects
+/// What was tried as a candidate.
+fn candidate((effect, place): Task, tried: Tried, shape: Shape) -> Candidate {
+    Candidate {
+        effect,
+        place,
+        shape,
+        gain: tried.counts(),
+        projected: tried.projected,
+        eta: tried.eta,
+        ruled_out: tried.why.map(|why| (why, tried.gain)),
+    }
+}
+
+/// Every effect at every place with its best shape; by falling gain.
+pub fn singles(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Vec<Candidate> {
+    let tasks: Vec<Task> = effects
         .iter()
         .enumerate()
         .flat_map(|(e, effect)| effect.sites(cx).into_iter().map(move |p| (e, p)))
         .collect();
-    let mut all: Vec<Candidate> = tasks
-        .par_iter()
-        .with_max_len(1)
-        .filter_map(|(e, place)| best_shape(evidence, cx, effects, *e, place, beside, &before))
-        .collect();
+    let beside = &evidence.set(&[]);
+    let finder = Finder {
+        cx,
+        effects,
+        beside,
+    };
+    let mut all = finder.best_shapes(&tasks);
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     all
 }

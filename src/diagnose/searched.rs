@@ -50,9 +50,11 @@ impl<'a> Searched<'a> {
         let phi = evidence.parameters(&[], &evidence.fit(&[]));
         let cx = Context::new(data, phi)?;
         progress("every effect at every place");
-        let list = singles(&evidence, &cx, effects, &[]);
-        let (cx, list) = settled(data, &evidence, effects, cx, list)?;
+        let list = singles(&evidence, &cx, effects);
+        let (cx, mut list) = settled(data, &evidence, effects, cx, list)?;
         let decision = decide(&evidence, &cx, effects, &list, progress);
+        // only their energies are asked for from here on
+        list.iter_mut().for_each(|c| c.projected.forget());
         Ok(Searched {
             evidence,
             cx,

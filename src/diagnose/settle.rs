@@ -8,7 +8,7 @@
 use super::catalogue::{Context, Effect};
 use super::data::Data;
 use super::evidence::Evidence;
-use super::search::{Candidate, again, best_shape, singles};
+use super::search::{Candidate, Finder, singles};
 use super::thresholds::THRESHOLDS as T;
 use crate::error::Result;
 
@@ -28,7 +28,7 @@ pub fn settled<'a>(
     if !list.first().is_some_and(sways) {
         return Ok((cx, list));
     }
-    let none = evidence.fit(&[]);
+    let none = evidence.set(&[]);
     let mut best: Option<(Context, f64)> = None;
     let near = list
         .iter()
@@ -39,9 +39,14 @@ pub fn settled<'a>(
         let mut last = None;
         for round in 0..T.settle.rounds {
             let next = Context::new(data, phi)?;
+            let finder = Finder {
+                cx: &next,
+                effects,
+                beside: &none,
+            };
             let found = match round {
-                0 => best_shape(evidence, &next, effects, c.effect, &c.place, &[], &none),
-                _ => again(evidence, &next, effects, &c),
+                0 => finder.best_shape((c.effect, c.place)),
+                _ => finder.again(&c),
             };
             let Some(found) = found.filter(|f| f.ruled_out.is_none()) else {
                 break;
@@ -63,7 +68,7 @@ pub fn settled<'a>(
     let Some((next, _)) = best.filter(|b| b.1 > T.settle.least * most) else {
         return Ok((cx, list));
     };
-    let anew = singles(evidence, &next, effects, &[]);
+    let anew = singles(evidence, &next, effects);
     match anew.first().is_some_and(sways) {
         true => Ok((next, anew)),
         false => Ok((cx, list)),

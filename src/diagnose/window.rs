@@ -79,14 +79,20 @@ pub fn fine_values(
 
 /// Triangular average of values on sub-steps, one a sample.
 pub fn from_fine(values: &[f64], count: usize, out: &mut Vec<f64>) {
-    let w = FINE as isize;
     let last = values.len() as isize - 1;
-    for i in 0..count as isize {
-        let at = i * w;
-        let mut sum = 0.0;
-        for k in 1 - w..w {
-            sum += (w - k.abs()) as f64 * values[(at + k).clamp(0, last) as usize];
-        }
-        out.push(sum / (w * w) as f64);
+    let weights: [f64; 2 * FINE - 1] =
+        std::array::from_fn(|k| (FINE - k.abs_diff(FINE - 1)) as f64);
+    for i in 0..count {
+        // from just after the sample before to just before the next one
+        let from = (i * FINE) as isize + 1 - FINE as isize;
+        let inside = usize::try_from(from).ok();
+        let whole = inside.and_then(|from| values.get(from..from + 2 * FINE - 1));
+        let sum: f64 = match whole {
+            Some(values) => weights.iter().zip(values).map(|(w, x)| w * x).sum(),
+            None => (weights.iter().zip(from..))
+                .map(|(w, at)| w * values[at.clamp(0, last) as usize])
+                .sum(),
+        };
+        out.push(sum / (FINE * FINE) as f64);
     }
 }

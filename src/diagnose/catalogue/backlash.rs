@@ -1,5 +1,6 @@
 //! A gap in the transmission: the link falls from flank to flank when the transmitted torque changes sign.
 
+use super::spring::Springs;
 use super::*;
 
 /// Backlash.
@@ -36,8 +37,8 @@ impl Effect for Backlash {
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
         let mut all = Vec::new();
-        for gap in ladder(6e-4, 3e-2, 6) {
-            for frequency in [8.0, 16.0, 32.0, 60.0] {
+        for frequency in [8.0, 16.0, 32.0, 60.0] {
+            for gap in ladder(6e-4, 3e-2, 6) {
                 for damping in [0.03, 0.15] {
                     all.push(Shape::of(&[gap, frequency, damping]));
                 }
@@ -67,26 +68,26 @@ impl Effect for Backlash {
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
-        let j = place.first();
-        let spring = |r: &Series, k: usize| {
-            spring::way(
-                spring::carried(cx, j, k),
-                r.dt,
-                shape[0],
-                shape[1],
-                shape[2],
-                0.0,
-                r.cycle,
-            )
-        };
-        if draft {
-            let mut all = Vec::with_capacity(cx.data.rows());
-            for (k, r) in cx.data.records.iter().enumerate() {
-                all.extend_from_slice(&spring(r, k)[2]);
+        match draft {
+            true => self
+                .drafts(cx, place, std::slice::from_ref(shape))
+                .remove(0),
+            false => {
+                let j = place.first();
+                let carried = |k: usize| spring::carried(cx, j, k);
+                let way =
+                    |r: &Series, k: usize| spring::way(carried(k), r.dt, springs(shape), r.cycle);
+                vec![cx.displaced(j, way)]
             }
-            return vec![cx.inertial(j, &all, true)];
         }
-        vec![cx.displaced(j, spring)]
+    }
+
+    fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
+        let (j, springs) = (place.first(), shapes.iter().map(springs));
+        let all = spring::accelerations(cx, j, &springs.collect::<Vec<_>>());
+        (all.iter())
+            .map(|a| vec![cx.inertial(j, a, true)])
+            .collect()
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
@@ -109,5 +110,15 @@ impl Effect for Backlash {
             constant("contact_stiffness", stiffness, unit),
             value("scale", eta[0], std[0], ""),
         ]
+    }
+}
+
+/// Gap, natural frequency of the link on a flank, damping ratio.
+fn springs(shape: &Shape) -> Springs {
+    Springs {
+        gap: shape[0],
+        frequency: shape[1],
+        damping: shape[2],
+        cubic: 0.0,
     }
 }

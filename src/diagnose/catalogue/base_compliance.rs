@@ -1,8 +1,9 @@
 //! The base tilts on springs under the moment that the robot exerts on it: `M δ̈ + D δ̇ + K δ = −τ_base`
 //! about each axis, with the inertia `M` of the robot about the base.
 
-use super::spring::Carried;
+use super::spring::{Carried, Springs};
 use super::*;
+use rayon::prelude::*;
 
 /// Base compliance.
 pub struct BaseCompliance;
@@ -78,7 +79,13 @@ impl Effect for BaseCompliance {
                 slopes: [&[], &[]],
                 measured: &r.measured,
             };
-            spring::way(carried, r.dt, 0.0, shape[0], shape[1], 0.0, r.cycle)
+            let springs = Springs {
+                gap: 0.0,
+                frequency: shape[0],
+                damping: shape[1],
+                cubic: 0.0,
+            };
+            spring::way(carried, r.dt, springs, r.cycle)
         })
     }
 
@@ -217,38 +224,45 @@ impl Load {
 /// of a tilt of record `k` about axis 0 or 1, per unit of its coefficient.
 pub(crate) fn tilted(
     cx: &Context,
-    motion: impl Fn(&Series, usize, usize) -> [Vec<f64>; 3],
+    motion: impl Fn(&Series, usize, usize) -> [Vec<f64>; 3] + Sync,
 ) -> Vec<Column> {
     let robot = cx.data.plant.robot();
     let tree = crate::dynamics::Tree::new(&on_joints(robot));
-    let n = cx.data.joints();
-    (0..2)
-        .map(|axis| {
-            let mut rows = vec![Vec::with_capacity(cx.data.rows()); n];
-            for (k, r) in cx.data.records.iter().enumerate() {
-                let phi = bodies(cx, k);
-                let full = motion(r, k, axis);
-                let largest = full[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
-                let step = 1e-4 / largest;
-                let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
-                let side = |sign: f64| {
-                    let tilt: [Vec<f64>; 3] =
-                        std::array::from_fn(|d| full[d].iter().map(|v| sign * step * v).collect());
-                    let tilts = if axis == 0 {
-                        [&tilt, &still]
-                    } else {
-                        [&still, &tilt]
-                    };
-                    let x = extended(r, tilts);
-                    let mut tau = vec![0.0; x.dof * x.count];
-                    tree.inverse_dynamics(&mut Default::default(), &phi, &x, &mut tau);
-                    tau
-                };
-                let (plus, minus) = (side(1.0), side(-1.0));
-                for (j, row) in rows.iter_mut().enumerate() {
-                    let at = (j + 2) * r.count;
-                    row.extend((at..at + r.count).map(|i| (plus[i] - minus[i]) / (2.0 * step)));
-                }
+    let records = &cx.data.records;
+    // torques of the joints for one axis and record
+    let torques = |axis: usize, k: usize| -> Vec<f64> {
+        let (r, phi) = (&records[k], bodies(cx, k));
+        let full = motion(r, k, axis);
+        let largest = full[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
+        let step = 1e-4 / largest;
+        let still = [vec![0.0; r.count], vec![0.0; r.count], vec![0.0; r.count]];
+        let side = |sign: f64| {
+            let tilt: [Vec<f64>; 3] =
+                std::array::from_fn(|d| full[d].iter().map(|v| sign * step * v).collect());
+            let tilts = match axis {
+                0 => [&tilt, &still],
+                _ => [&still, &tilt],
+            };
+            let x = extended(r, tilts);
+            let mut tau = vec![0.0; x.dof * x.count];
+            tree.inverse_dynamics(&mut Default::default(), &phi, &x, &mut tau);
+            tau.split_off(2 * r.count)
+        };
+        let (mut plus, minus) = (side(1.0), side(-1.0));
+        let both = plus.iter_mut().zip(&minus);
+        both.for_each(|(a, b)| *a = (*a - b) / (2.0 * step));
+        plus
+    };
+    let all = (0..2 * records.len()).into_par_iter().with_max_len(1);
+    let all: Vec<Vec<f64>> = all
+        .map(|i| torques(i / records.len(), i % records.len()))
+        .collect();
+    all.chunks(records.len())
+        .map(|of| {
+            let mut rows = vec![Vec::with_capacity(cx.data.rows()); cx.data.joints()];
+            for (torques, r) in of.iter().zip(records) {
+                let each = rows.iter_mut().zip(torques.chunks_exact(r.count));
+                each.for_each(|(row, torque)| row.extend_from_slice(torque));
             }
             prune(Column {
                 rows: rows.into_iter().enumerate().collect(),

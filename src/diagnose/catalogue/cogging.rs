@@ -1,6 +1,8 @@
 //! Torque that repeats with the turn of the motor.
 
 use super::*;
+use crate::diagnose::window::fine;
+use crate::signals::wiener::likewise;
 
 /// Cogging (torque ripple).
 pub struct Cogging;
@@ -38,10 +40,16 @@ impl Effect for Cogging {
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let (j, k) = (place.first(), shape[0]);
-        vec![
-            Column::on(j, cx.data.own(j, |q, _| (k * q).sin())),
-            Column::on(j, cx.data.own(j, |q, _| (k * q).cos())),
-        ]
+        let column = |f: &dyn Fn(f64) -> f64| {
+            // what no controller makes up for moves the motor: it shows where the motor's acceleration is known
+            let all = cx.data.each(|r, _| {
+                let ((q, v), mut out) = (r.state(j), Vec::with_capacity(r.count));
+                fine(q, v, r.acceleration(j), r.dt, |q, _| f(k * q), &mut out);
+                likewise(&out, r.cycle, r.dt)
+            });
+            Column::on(j, all)
+        };
+        vec![column(&f64::sin), column(&f64::cos)]
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {

@@ -11,6 +11,7 @@ use crate::mechanism::MechanismMotion;
 use crate::plant;
 use crate::robot::{JointTerm, Motion};
 use crate::signals::series::Series;
+use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Step of the differences by which the torque of a joint is derived, rad or m, and of its rate.
@@ -135,6 +136,22 @@ impl<'a> Context<'a> {
             .collect()
     }
 
+    /// Terms of an actuator's own joint, in the order of [`JointTerm::ALL`]: as fitted, else as the robot file has them;
+    /// `None` where those of one drive act on others.
+    pub fn terms(&self, j: usize) -> Option<[f64; 4]> {
+        let plant = self.data.plant;
+        let mut all = plant.actuators()[j].terms;
+        let own = plant.actuated()[j];
+        for (p, value) in self.data.parameters.iter().zip(&self.phi) {
+            for (k, of) in JointTerm::ALL.into_iter().enumerate() {
+                if p.kind == (plant::Column::Term { joint: own, term: of }) {
+                    all[k] = *value;
+                }
+            }
+        }
+        (!plant.redundant()).then_some(all)
+    }
+
     /// Kind of motion of an actuator.
     pub fn motion(&self, j: usize) -> Motion {
         self.data.plant.actuators()[j].motion
@@ -180,42 +197,39 @@ impl<'a> Context<'a> {
         j: usize,
         delta: impl Fn(&Series, usize) -> [Vec<f64>; 3] + Sync,
     ) -> Column {
-        let n = self.data.joints();
+        // ways, and the step by which the torque is differentiated along each
+        let of = |k: usize| {
+            let way = delta(&self.data.records[k], k);
+            let largest = way[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
+            (way, 1e-4 / largest)
+        };
+        let ways = (0..self.data.records.len()).into_par_iter().with_max_len(1);
+        let ways: Vec<([Vec<f64>; 3], f64)> = ways.map(of).collect();
         let side = |sign: f64| {
             self.data.torque_of(&self.phi, |r, k, x: &mut Samples| {
-                let d = delta(r, k);
-                let largest = d[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
-                let step = sign * 1e-4 / largest;
+                let (way, step) = &ways[k];
                 let row = j * r.count..(j + 1) * r.count;
-                for (to, from) in [&mut x.q, &mut x.qd, &mut x.qdd].into_iter().zip(&d) {
+                for (to, from) in [&mut x.q, &mut x.qd, &mut x.qdd].into_iter().zip(way) {
                     for (x, v) in to[row.clone()].iter_mut().zip(from) {
-                        *x += step * v;
+                        *x += sign * step * v;
                     }
                 }
             })
         };
-        let (Ok(plus), Ok(minus)) = (side(1.0), side(-1.0)) else {
+        let (Ok(plus), Ok(minus)) = rayon::join(|| side(1.0), || side(-1.0)) else {
             return Column::default();
         };
-        let rows = (0..n)
-            .map(|i| {
-                let mut out = Vec::with_capacity(self.data.rows());
-                for (k, r) in self.data.records.iter().enumerate() {
-                    let d = delta(r, k);
-                    let largest = d[0].iter().fold(1e-12f64, |m, v| m.max(v.abs()));
-                    let step = 2e-4 / largest;
-                    let span = self.data.span(k);
-                    out.extend(
-                        plus[i][span.clone()]
-                            .iter()
-                            .zip(&minus[i][span])
-                            .map(|(a, b)| (a - b) / step),
-                    );
-                }
-                (i, out)
-            })
-            .collect();
-        prune(Column { rows })
+        let rows = plus.into_iter().zip(minus).map(|(mut plus, minus)| {
+            for (k, (_, step)) in ways.iter().enumerate() {
+                let span = self.data.span(k);
+                let both = plus[span.clone()].iter_mut().zip(&minus[span]);
+                both.for_each(|(a, b)| *a = (*a - b) / (2.0 * step));
+            }
+            plus
+        });
+        prune(Column {
+            rows: rows.enumerate().collect(),
+        })
     }
 
     /// `M_ij δ̈` on the rows of all actuators for an acceleration `δ̈` of coordinate `j` given on all

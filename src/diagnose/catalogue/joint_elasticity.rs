@@ -1,5 +1,6 @@
 //! The link follows the motor through a spring: `q_link = q − τ_J/K`.
 
+use super::spring::Springs;
 use super::*;
 
 /// Joint elasticity.
@@ -63,26 +64,26 @@ impl Effect for JointElasticity {
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
-        let j = place.first();
-        let spring = |r: &Series, k: usize| {
-            spring::way(
-                spring::carried(cx, j, k),
-                r.dt,
-                0.0,
-                shape[0],
-                shape[1],
-                shape[2],
-                r.cycle,
-            )
-        };
-        if draft {
-            let mut all = Vec::with_capacity(cx.data.rows());
-            for (k, r) in cx.data.records.iter().enumerate() {
-                all.extend_from_slice(&spring(r, k)[2]);
+        match draft {
+            true => self
+                .drafts(cx, place, std::slice::from_ref(shape))
+                .remove(0),
+            false => {
+                let j = place.first();
+                let carried = |k: usize| spring::carried(cx, j, k);
+                let way =
+                    |r: &Series, k: usize| spring::way(carried(k), r.dt, springs(shape), r.cycle);
+                vec![cx.displaced(j, way)]
             }
-            return vec![cx.inertial(j, &all, false)];
         }
-        vec![cx.displaced(j, spring)]
+    }
+
+    fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
+        let (j, springs) = (place.first(), shapes.iter().map(springs));
+        let all = spring::accelerations(cx, j, &springs.collect::<Vec<_>>());
+        (all.iter())
+            .map(|a| vec![cx.inertial(j, a, false)])
+            .collect()
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
@@ -112,5 +113,15 @@ impl Effect for JointElasticity {
             constant("damping_ratio", shape[1], ""),
             constant("cubic_share", shape[2], ""),
         ]
+    }
+}
+
+/// Natural frequency of the link on its spring, damping ratio, stiffening at the largest load.
+fn springs(shape: &Shape) -> Springs {
+    Springs {
+        gap: 0.0,
+        frequency: shape[0],
+        damping: shape[1],
+        cubic: shape[2],
     }
 }

@@ -5,12 +5,29 @@ use super::*;
 /// Load-dependent friction.
 pub struct LoadDependentFriction;
 
+/// The form whose load is all that the motor makes, friction and all, and not the bodies' torque alone.
+const MOTOR: u8 = 1;
+
+impl LoadDependentFriction {
+    /// The load of a form, and the largest.
+    fn load<'a>(cx: &'a Context, j: usize, form: u8) -> (&'a [f64], f64) {
+        match form {
+            MOTOR => {
+                let load = &cx.model[j];
+                let largest = load.iter().fold(1e-9f64, |m, v| m.max(v.abs()));
+                (load, largest)
+            }
+            _ => (&cx.rigid[j], cx.peak[j]),
+        }
+    }
+}
+
 impl Effect for LoadDependentFriction {
     fn card(&self) -> Card {
         Card {
             name: "load_dependent_friction",
             title: "load-dependent friction",
-            equation: "β |τ_load|^e sgn q̇",
+            equation: "β |τ_load|^e sgn q̇, or β |τ_motor|^e sgn q̇",
             source: "Hamon, Gautier, Garrec & Janot 2010; Bittencourt 2010",
             aliases: &[],
             separated_by: "the same speed with two payloads",
@@ -21,23 +38,37 @@ impl Effect for LoadDependentFriction {
     }
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
-        [0.7, 1.0, 1.4, 2.0].map(|e| Shape::of(&[e])).to_vec()
+        let bodies = [0.7, 1.0, 1.4, 2.0].map(|e| Shape::of(&[e]));
+        let motor = [0.7, 1.0, 1.4].map(|e| Shape::new(MOTOR, &[e]));
+        bodies.into_iter().chain(motor).collect()
+    }
+
+    fn forms(&self) -> u8 {
+        2
     }
 
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let j = e.place.first();
-        let [level, peak, power] = [e.eta[0], cx.peak[j], e.shape[0]].map(py);
-        let level = format!("{level} * (xp.abs(load) / {peak}) ** {power}");
-        Some(Element::dry(j, T.reversals.sharp * cx.data.speed[j], level))
+        let sharp = T.reversals.sharp * cx.data.speed[j];
+        let (_, largest) = Self::load(cx, j, e.shape.form);
+        let [level, largest, power] = [e.eta[0], largest, e.shape[0]].map(py);
+        let load = match e.shape.form {
+            MOTOR => {
+                let [_, viscous, dry, offset] = cx.terms(j)?.map(py);
+                let turns = format!("xp.tanh(dq / {})", py(sharp));
+                format!("load + {offset} + {viscous} * dq + {dry} * {turns}")
+            }
+            _ => "load".into(),
+        };
+        let level = format!("{level} * (xp.abs({load}) / {largest}) ** {power}");
+        Some(Element::dry(j, sharp, level))
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
-        let values = cx
-            .sign(j)
-            .iter()
-            .zip(&cx.rigid[j])
-            .map(|(s, load)| s * (load.abs() / cx.peak[j]).powf(shape[0]))
+        let (load, largest) = Self::load(cx, j, shape.form);
+        let values = (cx.sign(j).iter().zip(load))
+            .map(|(s, load)| s * (load.abs() / largest).powf(shape[0]))
             .collect();
         vec![Column::on(j, values)]
     }
@@ -54,9 +85,14 @@ impl Effect for LoadDependentFriction {
             std,
         } = e;
         let unit = cx.torque_unit(place.first());
+        let (_, largest) = Self::load(cx, place.first(), shape.form);
+        let reference = match shape.form {
+            MOTOR => "reference_motor_torque",
+            _ => "reference_load",
+        };
         vec![
             value("torque_at_reference_load", eta[0], std[0], unit),
-            constant("reference_load", cx.peak[place.first()], unit),
+            constant(reference, largest, unit),
             constant("exponent", shape[0], ""),
         ]
     }

@@ -171,6 +171,11 @@ pub trait Effect: Sync {
     }
     /// Columns, per unit of the coefficients. A `draft` may leave out rows of lesser weight.
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column>;
+    /// Draft columns of several shapes, which may have work in common.
+    fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
+        let columns = |s| self.columns(cx, place, s, true);
+        shapes.iter().map(columns).collect()
+    }
     /// Whether coefficients make physical sense.
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, _eta: &[f64]) -> bool {
         true

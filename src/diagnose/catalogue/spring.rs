@@ -34,113 +34,190 @@ pub(crate) fn carried<'a>(cx: &'a Context, j: usize, k: usize) -> Carried<'a> {
     }
 }
 
+/// Springs of `M (2πf)²` with a damping ratio at both flanks of a gap.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Springs {
+    /// gap `b`, rad or m; 0 for a spring
+    pub gap: f64,
+    /// natural frequency `f`, Hz
+    pub frequency: f64,
+    /// damping ratio
+    pub damping: f64,
+    /// by how much they are stiffer at the largest load
+    pub cubic: f64,
+}
+
+impl Springs {
+    fn omega(&self) -> f64 {
+        2.0 * std::f64::consts::PI * self.frequency
+    }
+
+    /// Steps of a sub-step of the average: springs are followed more finely.
+    fn steps(&self, dt: f64) -> usize {
+        ((self.omega() * dt / FINE as f64 / 0.2).ceil() as usize).max(1)
+    }
+}
+
 /// Way `δ` of the link against the motor, its rate and acceleration, `M δ̈ = T(δ) − τ_J − ∂τ_J/∂q δ − ∂τ_J/∂q̇ δ̇`, where
-/// `T` is the torque of flanks at `±b/2` with springs of `M (2πf)²` and a damping ratio; the springs
-/// stiffen by `cubic` at the largest load. Averaged as torque is measured.
-#[allow(clippy::too_many_arguments)]
+/// `T` is the torque of flanks at `±b/2` with springs; these stiffen by `cubic` at the largest load. Averaged as torque is
+/// measured.
 pub(crate) fn way(
     carried: Carried,
     dt: f64,
-    gap: f64,
-    frequency: f64,
-    damping: f64,
-    cubic: f64,
+    springs: Springs,
     cycle: Option<usize>,
 ) -> [Vec<f64>; 3] {
+    let [one] = ways(carried, dt, [springs], cycle, 0..3);
+    one
+}
+
+/// Accelerations `δ̈` of the link of joint `j` on one spring after another, over all records (serial robots).
+pub(crate) fn accelerations(cx: &Context, j: usize, springs: &[Springs]) -> Vec<Vec<f64>> {
+    let mut all = vec![Vec::with_capacity(cx.data.rows()); springs.len()];
+    for (k, r) in cx.data.records.iter().enumerate() {
+        let carried = carried(cx, j, k);
+        let mut first = 0;
+        while first < springs.len() {
+            // side by side: those that take the same steps
+            let same = |s: &&Springs| s.steps(r.dt) == springs[first].steps(r.dt);
+            let rest = springs[first..].iter();
+            let group: Vec<Springs> = rest.take(SIDE).take_while(same).copied().collect();
+            let lanes: [Springs; SIDE] = std::array::from_fn(|l| group[l.min(group.len() - 1)]);
+            let found = match group.len() {
+                1 => vec![way(carried, r.dt, group[0], r.cycle)],
+                _ => ways(carried, r.dt, lanes, r.cycle, 2..3).to_vec(),
+            };
+            let into = all[first..].iter_mut().take(group.len());
+            into.zip(found).for_each(|(all, [_, _, a])| all.extend(a));
+            first += group.len();
+        }
+    }
+    all
+}
+
+/// Springs that are followed side by side.
+const SIDE: usize = 4;
+
+/// Ways on several springs that take the same steps, side by side: each waits for its own last step only. Of `wanted` of way,
+/// rate and acceleration the others stay empty.
+fn ways<const N: usize>(
+    carried: Carried,
+    dt: f64,
+    springs: [Springs; N],
+    cycle: Option<usize>,
+    wanted: std::ops::Range<usize>,
+) -> [[Vec<f64>; 3]; N] {
     let Carried {
         load,
         mass,
         slopes: [stiff, drag],
         measured,
     } = carried;
-    let omega = 2.0 * std::f64::consts::PI * frequency;
-    let n = load.len();
-    // sub-steps of the springs, finer than those of the average
-    let sub = ((omega * dt / FINE as f64 / 0.2).ceil() as usize).max(1);
+    // once it has settled a motion that repeats is followed for one period, and the window at its end
+    let count = load.len();
+    let n = cycle.map_or(count, |cycle| count.min(cycle + 2));
+    let sub = springs[0].steps(dt);
     let h = dt / (FINE * sub) as f64;
-    let mean = mass.iter().sum::<f64>() / n as f64;
-    let k = mean * omega * omega;
-    let d = 2.0 * damping * mean * omega;
-    let spring = Spring {
-        k,
-        gap,
+    let mean = mass.iter().sum::<f64>() / count as f64;
+    let each = springs.map(|s| Spring {
+        k: mean * s.omega() * s.omega(),
+        gap: s.gap,
         mean,
-        omega,
+        omega: s.omega(),
         h,
         steps: FINE * sub,
-    };
-    let twist = load.iter().fold(1e-12f64, |m, v| m.max(v.abs())) / k;
+    });
+    let k = each.each_ref().map(|s| s.k);
+    let d = springs.map(|s| 2.0 * s.damping * mean * s.omega());
+    let largest = load.iter().fold(1e-12f64, |m, v| m.max(v.abs()));
+    let twist = k.map(|k| largest / k);
+    let half = springs.map(|s| s.gap / 2.0);
+    let cubic = springs.map(|s| s.cubic);
     // what lies between the ends that say nothing
     let (first, last) = match (cycle, measured.iter().position(|m| *m)) {
         (None, Some(first)) => (first, measured.iter().rposition(|m| *m).unwrap_or(n - 1)),
-        _ => (0, n - 1),
+        _ => (0, count - 1),
     };
-    let back = (first + (BACK.0.min(BACK.1 / frequency) / dt) as usize).min(last);
-    let begin = match cycle {
-        Some(_) => load[0],
-        None => load[back],
-    };
-    let (mut x, mut v) = (-gap / 2.0 * begin.signum() - begin / k, 0.0);
-    let mut values: [Vec<f64>; 3] = Default::default();
-    let settle = cycle.unwrap_or(0).min(n - 1);
-    if cycle.is_none() {
-        // a record may begin in the middle of a motion: backwards through its begin, so that nothing swings from the start
-        (x, v) = match gap == 0.0 {
-            false => spring.backwards([0.5], (x, v), &carried, first..back)[0],
-            // seen backwards, a swing is fed: from three that are drained towards the one that is not, by a parabola
-            true => {
-                let weight = |i: usize| -> f64 {
-                    let others = (0..DRAINED.len()).filter(|&j| j != i);
-                    others
-                        .map(|j| (-damping - DRAINED[j]) / (DRAINED[i] - DRAINED[j]))
-                        .product()
-                };
-                let states = spring.backwards(DRAINED, (x, v), &carried, first..back);
-                (0..DRAINED.len()).fold((0.0, 0.0), |sum, i| {
-                    let (state, w) = (states[i], weight(i));
-                    (sum.0 + w * state.0, sum.1 + w * state.1)
-                })
-            }
+    let (mut x, mut v) = ([0.0; N], [0.0; N]);
+    for l in 0..N {
+        let Springs {
+            gap,
+            frequency,
+            damping,
+            ..
+        } = springs[l];
+        let back = (first + (BACK.0.min(BACK.1 / frequency) / dt) as usize).min(last);
+        let begin = match cycle {
+            Some(_) => load[0],
+            None => load[back],
         };
+        (x[l], v[l]) = (-half[l] * begin.signum() - begin / k[l], 0.0);
+        if cycle.is_none() {
+            let (spring, start) = (&each[l], (x[l], v[l]));
+            // a record may begin in the middle of a motion: backwards through its begin, so that nothing swings from the start
+            (x[l], v[l]) = match gap == 0.0 {
+                false => spring.backwards([0.5], start, &carried, first..back)[0],
+                // seen backwards, a swing is fed: from three that are drained towards the one that is not, by a parabola
+                true => {
+                    let weight = |i: usize| -> f64 {
+                        let others = (0..DRAINED.len()).filter(|&j| j != i);
+                        others
+                            .map(|j| (-damping - DRAINED[j]) / (DRAINED[i] - DRAINED[j]))
+                            .product()
+                    };
+                    let states = spring.backwards(DRAINED, start, &carried, first..back);
+                    (0..DRAINED.len()).fold((0.0, 0.0), |sum, i| {
+                        let (state, w) = (states[i], weight(i));
+                        (sum.0 + w * state.0, sum.1 + w * state.1)
+                    })
+                }
+            };
+        }
     }
+    let settle = cycle.unwrap_or(0).min(count - 1);
+    let fine = (n - 1) * FINE + 1;
+    let mut values: [[Vec<f64>; 3]; N] = std::array::from_fn(|_| {
+        std::array::from_fn(|q| Vec::with_capacity(if wanted.contains(&q) { fine } else { 0 }))
+    });
+    let mut push = |now: [[f64; N]; 3], times: usize| {
+        for (l, of) in values.iter_mut().enumerate() {
+            for q in wanted.clone() {
+                of[q].extend(std::iter::repeat_n(now[q][l], times));
+            }
+        }
+    };
     for pass in 0..2 {
         let upto = if pass == 0 { settle } else { n };
         if pass == 1 {
-            values[0].resize(first * FINE, x);
-            values[1].resize(first * FINE, v);
-            values[2].resize(first * FINE, 0.0);
+            push([x, v, [0.0; N]], first * FINE);
         }
         for i in first..upto {
             let next = (i + 1).min(last);
             let inverse = 1.0 / mass[i].max(0.05 * mean);
             let (stiff, drag) = (slope(stiff, i), slope(drag, i));
             for s in 0..FINE {
-                let mut sum = 0.0;
+                let mut sum = [0.0; N];
                 let begin = (x, v);
                 for u in 0..sub {
                     let w = (s * sub + u) as f64 / (FINE * sub) as f64;
                     let tau = load[i.min(last)] + w * (load[next] - load[i.min(last)]);
-                    let beyond = spring.beyond(x);
-                    let mut t = -k * beyond;
-                    if cubic != 0.0 {
-                        t *= 1.0 + cubic * (beyond / twist).powi(2).min(9.0);
+                    for l in 0..N {
+                        // without a gap all of the way
+                        let beyond = x[l] - x[l].max(-half[l]).min(half[l]);
+                        let stiffer = (beyond / twist[l]) * (beyond / twist[l]);
+                        let bare = -k[l] * beyond * (1.0 + cubic[l] * stiffer.min(9.0));
+                        let damped = bare - d[l] * v[l];
+                        // flanks push only while they touch
+                        let touches = half[l] == 0.0 || damped * bare > 0.0;
+                        let t = if touches { damped } else { 0.0 };
+                        let a = (t - tau - stiff * x[l] - drag * v[l]) * inverse;
+                        sum[l] += a;
+                        v[l] += h * a;
+                        x[l] += h * v[l];
                     }
-                    // flanks push only while they touch
-                    if gap == 0.0 {
-                        t -= d * v;
-                    } else if beyond != 0.0 {
-                        let damped = t - d * v;
-                        t = if damped * t > 0.0 { damped } else { 0.0 };
-                    }
-                    let a = (t - tau - stiff * x - drag * v) * inverse;
-                    sum += a;
-                    v += h * a;
-                    x += h * v;
                 }
                 if pass == 1 {
-                    values[0].push(begin.0);
-                    values[1].push(begin.1);
-                    values[2].push(sum / sub as f64);
+                    push([begin.0, begin.1, sum.map(|sum| sum / sub as f64)], 1);
                 }
                 if pass == 1 && i + 1 == n {
                     break;
@@ -148,11 +225,19 @@ pub(crate) fn way(
             }
         }
     }
-    values.map(|mut all| {
-        all.truncate((n - 1) * FINE + 1);
-        let mut out = Vec::with_capacity(n);
-        from_fine(&all, n, &mut out);
-        out
+    values.map(|of| {
+        of.map(|mut all| {
+            let mut out = Vec::new();
+            if !all.is_empty() {
+                all.truncate(fine);
+                from_fine(&all, n, &mut out);
+            }
+            match cycle.filter(|cycle| n < count && !out.is_empty() && *cycle + 1 < n) {
+                // its first sample is that after the period: the window of the very first has one side only
+                Some(cycle) => (0..count).map(|i| out[(i + cycle - 1) % cycle + 1]).collect(),
+                None => out,
+            }
+        })
     })
 }
 
@@ -235,6 +320,46 @@ pub(crate) fn constants(cx: &Context, j: usize, frequency: f64, damping: f64) ->
 mod tests {
     use super::*;
 
+    /// A spring without a gap that does not stiffen.
+    fn soft(frequency: f64, damping: f64) -> Springs {
+        Springs {
+            gap: 0.0,
+            frequency,
+            damping,
+            cubic: 0.0,
+        }
+    }
+
+    /// Springs, gaps and springs that stiffen do side by side what each does alone.
+    #[test]
+    fn springs_side_by_side_do_what_each_does_alone() {
+        let n = 1500;
+        let (load, mass) = (load(n), vec![1.2; n]);
+        let carried = Carried {
+            load: &load,
+            mass: &mass,
+            slopes: [&vec![-20.0; n], &vec![0.3; n]],
+            measured: &vec![true; n],
+        };
+        let lanes = [[0.0, 0.0], [0.0, 0.5], [0.002, 0.0], [0.01, 0.0]].map(|[gap, cubic]| {
+            let spring = soft(6.5, 0.06);
+            Springs {
+                gap,
+                cubic,
+                ..spring
+            }
+        });
+        for cycle in [Some(1000), None] {
+            let together = ways(carried, 0.004, lanes, cycle, 0..3);
+            for (alone, together) in lanes.iter().zip(&together) {
+                assert_eq!(&way(carried, 0.004, *alone, cycle), together);
+            }
+            let [[way, rate, a], ..] = ways(carried, 0.004, lanes, cycle, 2..3);
+            assert!(way.is_empty() && rate.is_empty());
+            assert_eq!(a, together[0][2]);
+        }
+    }
+
     /// Four periods of a load with a harmonic at a third of the resonance, 250 Hz.
     fn load(n: usize) -> Vec<f64> {
         let at = |i: usize, f: f64| (2.0 * std::f64::consts::PI * f * i as f64 / 250.0).sin();
@@ -255,7 +380,7 @@ mod tests {
             slopes: [&stiff, &[]],
             measured: &vec![true; n],
         };
-        let truth = way(whole, 0.004, 0.0, 6.5, 0.06, 0.0, Some(cycle));
+        let truth = way(whole, 0.004, soft(6.5, 0.06), Some(cycle));
         // 26 samples at either end have no accelerations
         let (mut spoiled, mut measured) = (good.clone(), vec![true; n]);
         for i in (0..26).chain(n - 26..n) {
@@ -267,7 +392,7 @@ mod tests {
             measured: &measured,
             ..whole
         };
-        let found = way(cut, 0.004, 0.0, 6.5, 0.06, 0.0, None);
+        let found = way(cut, 0.004, soft(6.5, 0.06), None);
         for (k, name) in ["way", "rate", "acceleration"].iter().enumerate() {
             let size = truth[k].iter().fold(0.0f64, |m, v| m.max(v.abs()));
             let off = (30..n - 30).fold(0.0f64, |m, i| m.max((found[k][i] - truth[k][i]).abs()));
@@ -287,7 +412,7 @@ mod tests {
             measured: &vec![true; n],
         };
         let k = (2.0 * std::f64::consts::PI * 5.0f64).powi(2);
-        let found = way(carried, 0.004, 0.0, 5.0, 0.1, 0.0, None);
+        let found = way(carried, 0.004, soft(5.0, 0.1), None);
         let stands = 10.0 / (k - 100.0);
         assert!((found[0][n - 1] / stands - 1.0).abs() < 1e-3);
     }

@@ -1,5 +1,6 @@
 //! A kinematic error of the gear that repeats with its turn, with the inertia that it shakes.
 
+use super::spring::Springs;
 use super::*;
 use crate::diagnose::window::{FINE, fine_values, from_fine};
 use crate::signals::wiener::likewise;
@@ -45,8 +46,9 @@ impl Effect for TransmissionError {
                 .collect(),
             None => orders.take(SPRUNG_ORDERS.len()).collect(),
         };
-        let sprung = |k: f64| FREQUENCIES.map(|f| Shape::new(SPRUNG, &[k, f]));
-        all.extend(few.into_iter().flat_map(sprung));
+        // those on one spring together: what its load does is the same for all
+        let sprung = |f: f64| few.iter().map(move |k| Shape::new(SPRUNG, &[*k, f]));
+        all.extend(FREQUENCIES.into_iter().flat_map(sprung));
         all
     }
 
@@ -79,28 +81,12 @@ impl Effect for TransmissionError {
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, draft: bool) -> Vec<Column> {
-        let j = place.first();
-        let column = |of: &dyn Fn(usize, &Series) -> Vec<f64>| {
-            let mut all = Vec::with_capacity(cx.data.rows());
-            for (i, r) in cx.data.records.iter().enumerate() {
-                // the acceleration of the motor, which nearly makes up for it where the motor is free to follow, ends there
-                all.extend(likewise(&of(i, r), r.cycle, r.dt));
-            }
-            cx.inertial(j, &all, draft)
-        };
-        let phases = [0.0, std::f64::consts::FRAC_PI_2];
-        if shape.form != SPRUNG {
-            return phases
-                .map(|phase| column(&|_, r| shaken(r, j, shape[0], phase)))
-                .to_vec();
-        }
-        let swings = phases.map(|phase| column(&|_, r| swung(r, j, [shape[0], shape[1]], phase)));
-        let load = column(&|i, r| {
-            let carried = spring::carried(cx, j, i);
-            let [.., a] = spring::way(carried, r.dt, 0.0, shape[1], DAMPING, 0.0, r.cycle);
-            a
-        });
-        swings.into_iter().chain([load]).collect()
+        self.each(cx, place, std::slice::from_ref(shape), draft)
+            .remove(0)
+    }
+
+    fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
+        self.each(cx, place, shapes, true)
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -136,40 +122,91 @@ impl Effect for TransmissionError {
     }
 }
 
-/// `1/k²` times the acceleration of `sin(kq + phase)`.
-fn shaken(r: &Series, j: usize, k: f64, phase: f64) -> Vec<f64> {
-    let ((q, v), a) = (r.state(j), r.acceleration(j));
-    let mut i = 0;
-    // k q̈ cos kq − k² q̇² sin kq
-    let values = fine_values(q, v, a, r.dt, |q, v, _| {
-        let a = a[(i / FINE).min(a.len() - 1)];
-        i += 1;
-        a / k * (k * q + phase).cos() - v * v * (k * q + phase).sin()
-    });
-    averaged(&values, r)
+impl TransmissionError {
+    /// Columns of several shapes; of a draft only the rows of the joint itself.
+    fn each(&self, cx: &Context, place: &Place, shapes: &[Shape], draft: bool) -> Vec<Vec<Column>> {
+        let j = place.first();
+        let column = |parts: &[Vec<f64>]| {
+            let of = parts.iter().zip(&cx.data.records);
+            // the acceleration of the motor, which nearly makes up for it where the motor is free to follow, ends there
+            let all = of.flat_map(|(x, r)| likewise(x, r.cycle, r.dt));
+            cx.inertial(j, &all.collect::<Vec<f64>>(), draft)
+        };
+        // what the load makes a spring do, for as long as the spring is the same
+        let mut load: Option<(f64, Column)> = None;
+        let mut of = |shape: &Shape| {
+            let both = cx.data.records.iter().map(|r| match shape.form {
+                SPRUNG => swung(r, j, [shape[0], shape[1]]),
+                _ => shaken(r, j, shape[0]),
+            });
+            let (sines, cosines): (Vec<_>, Vec<_>) = both.map(|[s, c]| (s, c)).unzip();
+            let mut columns = vec![column(&sines), column(&cosines)];
+            if shape.form == SPRUNG {
+                if load.as_ref().is_none_or(|l| l.0 != shape[1]) {
+                    let springs = Springs {
+                        gap: 0.0,
+                        frequency: shape[1],
+                        damping: DAMPING,
+                        cubic: 0.0,
+                    };
+                    let records = cx.data.records.iter().enumerate();
+                    let swings = records.map(|(i, r)| {
+                        let carried = spring::carried(cx, j, i);
+                        let [.., a] = spring::way(carried, r.dt, springs, r.cycle);
+                        a
+                    });
+                    load = Some((shape[1], column(&swings.collect::<Vec<_>>())));
+                }
+                columns.extend(load.iter().map(|l| l.1.clone()));
+            }
+            columns
+        };
+        shapes.iter().map(&mut of).collect()
+    }
 }
 
-/// `1/k²` times the acceleration of a link on a spring that `e = sin(kq + phase)` moves the end of:
+/// `1/k²` times the accelerations of `sin kq` and `cos kq`.
+fn shaken(r: &Series, j: usize, k: f64) -> [Vec<f64>; 2] {
+    let ((q, v), a) = (r.state(j), r.acceleration(j));
+    let mut cosine = Vec::with_capacity(r.count * FINE);
+    // k q̈ cos kq − k² q̇² sin kq, and −k q̈ sin kq − k² q̇² cos kq
+    let sine = fine_values(q, v, a, r.dt, |q, v, _| {
+        let a = a[(cosine.len() / FINE).min(a.len() - 1)];
+        let (sin, cos) = (k * q).sin_cos();
+        cosine.push(-a / k * sin - v * v * cos);
+        a / k * cos - v * v * sin
+    });
+    [averaged(&sine, r), averaged(&cosine, r)]
+}
+
+/// `1/k²` times the accelerations of a link on a spring that `e = sin kq` and `e = cos kq` move the end of:
 /// `ẍ = ω² (e − x) + 2 ζ ω (ė − ẋ)`.
-fn swung(r: &Series, j: usize, [k, frequency]: [f64; 2], phase: f64) -> Vec<f64> {
+fn swung(r: &Series, j: usize, [k, frequency]: [f64; 2]) -> [Vec<f64>; 2] {
     let ((q, v), a) = (r.state(j), r.acceleration(j));
     let omega = std::f64::consts::TAU * frequency;
     let h = r.dt / FINE as f64;
-    let mut state: Option<[f64; 2]> = None;
+    let mut states: Option<[[f64; 2]; 2]> = None;
+    let mut cosine = Vec::with_capacity(r.count * FINE);
     let mut step = |q: f64, v: f64, _: f64| {
-        let (sin, cos) = (k * q + phase).sin_cos();
-        let (e, rate) = (sin, k * v * cos);
-        let [x, u] = state.unwrap_or([e, rate]);
-        let a = omega * omega * (e - x) + 2.0 * DAMPING * omega * (rate - u);
-        let u = u + h * a;
-        state = Some([x + h * u, u]);
-        a / (k * k)
+        let (sin, cos) = (k * q).sin_cos();
+        let ends = [[sin, k * v * cos], [cos, -k * v * sin]];
+        let states = states.get_or_insert(ends);
+        let accelerations = [0, 1].map(|w| {
+            let ([e, rate], [x, u]) = (ends[w], &mut states[w]);
+            let a = omega * omega * (e - *x) + 2.0 * DAMPING * omega * (rate - *u);
+            *u += h * a;
+            *x += h * *u;
+            a / (k * k)
+        });
+        cosine.push(accelerations[1]);
+        accelerations[0]
     };
     // a motion that repeats goes on as it was before
-    if let Some(cycle) = r.cycle {
-        fine_values(&q[..cycle], &v[..cycle], &a[..cycle], r.dt, &mut step);
-    }
-    averaged(&fine_values(q, v, a, r.dt, &mut step), r)
+    let before = r.cycle.map_or(0, |cycle| {
+        fine_values(&q[..cycle], &v[..cycle], &a[..cycle], r.dt, &mut step).len()
+    });
+    let sine = fine_values(q, v, a, r.dt, &mut step);
+    [averaged(&sine, r), averaged(&cosine[before..], r)]
 }
 
 /// Values on the sub-steps of a record as torque is averaged.

@@ -24,16 +24,20 @@ impl<'a> Evidence<'a> {
             .iter()
             .map(|s| (s * loosen).max(floor))
             .collect();
+        // bodies before an actuator do not show in its torque: its columns begin behind theirs
+        let first: Vec<usize> = (0..n)
+            .map(|j| (0..p).find(|c| data.w[j].get(*c).is_some()).unwrap_or(p))
+            .collect();
         let mut w: Vec<Mat<f64>> = (0..n)
             .into_par_iter()
             .map(|j| {
-                let mut out = Mat::zeros(data.rows(), p);
-                for c in 0..p {
+                let mut out = Mat::zeros(data.rows(), p - first[j]);
+                for c in first[j]..p {
                     let Some(from) = data.w[j].get(c) else {
                         continue;
                     };
                     for (i, v) in data.modelled(j, from).into_iter().enumerate() {
-                        out[(i, c)] = v;
+                        out[(i, c - first[j])] = v;
                     }
                 }
                 out
@@ -58,10 +62,10 @@ impl<'a> Evidence<'a> {
             .collect();
         // scaled by the prior, so that the matrix is 1 + something
         let mut a = Mat::<f64>::identity(p, p);
-        for g in &grams {
-            for i in 0..p {
-                for k in 0..p {
-                    a[(i, k)] += g[(i, k)] * spread[i] * spread[k];
+        for (g, first) in grams.iter().zip(&first) {
+            for i in *first..p {
+                for k in *first..p {
+                    a[(i, k)] += g[(i - first, k - first)] * spread[i] * spread[k];
                 }
             }
         }
@@ -69,11 +73,13 @@ impl<'a> Evidence<'a> {
             Ok(f) => f.L().to_owned(),
             Err(_) => Mat::identity(p, p),
         };
-        // Q = W diag(spread) L⁻ᵀ: solve L Qᵀ = (W diag(spread))ᵀ
-        w.par_iter_mut().for_each(|w| {
-            for c in 0..p {
+        // Q = W diag(spread) L⁻ᵀ: solve L Qᵀ = (W diag(spread))ᵀ, where Q begins with the same columns of zeros
+        w.par_iter_mut().zip(&first).for_each(|(w, first)| {
+            let more = p - first;
+            let l = l.submatrix(*first, *first, more, more);
+            for c in 0..more {
                 for i in 0..w.nrows() {
-                    w[(i, c)] *= spread[c];
+                    w[(i, c)] *= spread[first + c];
                 }
             }
             // some rows at a time: a copy of all of them on every thread would be the most that a diagnosis holds
@@ -82,7 +88,7 @@ impl<'a> Evidence<'a> {
                 let mut some = w.subrows_mut(from, rows);
                 let mut t = some.rb().transpose().to_owned();
                 faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-                    l.as_ref(),
+                    l,
                     t.as_mut(),
                     faer::Par::Seq,
                 );
@@ -93,7 +99,7 @@ impl<'a> Evidence<'a> {
         let mut d = vec![0.0; p];
         let mut rr = 0.0;
         for j in 0..n {
-            for (c, d) in d.iter_mut().enumerate() {
+            for (c, d) in d[first[j]..].iter_mut().enumerate() {
                 let column = q[j].col(c);
                 let column = column.try_as_col_major().expect("column major").as_slice();
                 *d += dot(&column[..fitted], &r[j][..fitted]);
@@ -105,6 +111,7 @@ impl<'a> Evidence<'a> {
             data,
             phi,
             q,
+            first,
             l,
             r,
             d,

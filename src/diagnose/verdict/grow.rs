@@ -1,7 +1,7 @@
 //! The set of effects: forward steps, pairs that mask each other, and exchanges.
 
 use super::super::evidence::Projected;
-use super::super::search::{Candidate, best_shape};
+use super::super::search::Candidate;
 use super::super::thresholds::THRESHOLDS as T;
 use super::predict::predicts;
 use super::rivals::{challengers, merit};
@@ -84,17 +84,8 @@ fn polish(st: &State, set: &mut [Candidate]) {
     for i in 0..set.len() {
         let others: Vec<Candidate> = others(set, i);
         let beside: Vec<&Projected> = others.iter().map(|c| &c.projected).collect();
-        let before = st.evidence.fit(&beside);
-        let (effect, place) = (set[i].effect, set[i].place);
-        let better = best_shape(
-            st.evidence,
-            st.cx,
-            st.effects,
-            effect,
-            &place,
-            &beside,
-            &before,
-        );
+        let beside = st.evidence.set(&beside);
+        let better = st.finder(&beside).best_shape((set[i].effect, set[i].place));
         if let Some(b) = better.filter(|b| b.gain > 0.0) {
             set[i] = b;
         }
@@ -126,7 +117,8 @@ fn grown(
             return Some(pair);
         }
     }
-    if grown.len() > 1 {
+    // one that came after others may be a point of its grid
+    if grown.len() > 1 || !first {
         polish(st, &mut grown);
     }
     accepted(st, &grown, set.len()).then_some(grown)

@@ -2,7 +2,7 @@
 
 use super::super::catalogue::{Place, Shape};
 use super::super::evidence::Projected;
-use super::super::search::{Candidate, best_shape};
+use super::super::search::{Candidate, Task};
 use super::super::thresholds::THRESHOLDS as T;
 use super::beside::Beside;
 use super::state::State;
@@ -32,16 +32,9 @@ pub fn challengers(
     beside: &[&Projected],
     most: usize,
 ) -> Vec<Candidate> {
-    let before = st.evidence.fit(beside);
-    let mut quick: Vec<(f64, usize)> = list
-        .par_iter()
-        .enumerate()
-        .map(|(i, c)| {
-            let mut set = beside.to_vec();
-            set.push(&c.projected);
-            (st.evidence.fit(&set).gain - before.gain, i)
-        })
-        .collect();
+    let beside = st.evidence.set(beside);
+    let with = |(i, c): (usize, &Candidate)| (beside.with(&c.projected).gain, i);
+    let mut quick: Vec<(f64, usize)> = list.par_iter().enumerate().map(with).collect();
     quick.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     // the best places of every effect
     let mut chosen: Vec<usize> = Vec::new();
@@ -53,23 +46,10 @@ pub fn challengers(
             chosen.push(*i);
         }
     }
-    let mut all: Vec<Candidate> = chosen
-        .par_iter()
-        .with_max_len(1)
-        .filter_map(|i| {
-            let c = &list[*i];
-            best_shape(
-                st.evidence,
-                st.cx,
-                st.effects,
-                c.effect,
-                &c.place,
-                beside,
-                &before,
-            )
-        })
-        .filter(|c| c.gain > 0.0)
-        .collect();
+    let tasks = chosen.iter().map(|i| (list[*i].effect, list[*i].place));
+    let tasks: Vec<Task> = tasks.collect();
+    let mut all = st.finder(&beside).best_shapes(&tasks);
+    all.retain(|c| c.gain > 0.0);
     all.sort_by(|a, b| merit(st, b).total_cmp(&merit(st, a)));
     all
 }

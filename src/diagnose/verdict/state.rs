@@ -1,9 +1,9 @@
 //! Energies of the gap: what a set of effects takes from it, joint by joint.
 
 use super::super::catalogue::{Context, Effect};
-use super::super::evidence::{Evidence, Fit, Projected};
+use super::super::evidence::{Evidence, Fit, Projected, Set};
 use super::super::gap;
-use super::super::search::Candidate;
+use super::super::search::{Candidate, Finder};
 use super::super::thresholds::THRESHOLDS as T;
 use std::ops::Range;
 
@@ -60,6 +60,15 @@ impl State<'_> {
         match self.evidence.data.sticks() && members == 1 {
             true => T.matters.closed,
             false => 1.0,
+        }
+    }
+
+    /// Looks for shapes beside a set.
+    pub fn finder<'b>(&'b self, beside: &'b Set<'b>) -> Finder<'b> {
+        Finder {
+            cx: self.cx,
+            effects: self.effects,
+            beside,
         }
     }
 
