@@ -183,6 +183,7 @@ pub fn run(args: Args) -> Result<()> {
                 Some(h) => format!("{} on holdout", percent(h)),
                 // a load that some records carry shows in their parameters
                 None if !f.records.is_empty() => format!("shown by {}", f.records.join(", ")),
+                None if d.holdout.is_some() => "no gap on holdout".into(),
                 None => "no holdout record".into(),
             }
         );

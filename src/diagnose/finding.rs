@@ -36,7 +36,7 @@ pub struct Finding {
     pub explains: f64,
     /// 95 % interval of it
     pub interval: [f64; 2],
-    /// share of the gap on holdout records, where there are any
+    /// share of the gap on holdout records, where these show one
     pub holdout: Option<f64>,
     /// share of the effect that the nominal model cannot absorb
     pub visibility: f64,
@@ -140,7 +140,7 @@ fn members(
             confidence: m.confidence,
             explains: m.explains,
             interval,
-            holdout: data.predicts().then_some(m.holdout),
+            holdout: m.holdout,
             visibility: m.visibility,
             decoys: m.decoys,
             unsteady: m.unsteady,

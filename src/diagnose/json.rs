@@ -210,6 +210,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         "prior_surprise": numbers(&d.surprise),
         "prior_closeness": numbers(&d.closeness),
         "torque_window": number(d.window),
+        "friction_lead": number(d.lead),
         "thresholds": THRESHOLDS,
         "files": d.improved.files,
         "changed": d.improved.remarks.iter().zip(&d.improved.in_mujoco).map(|(r, files)| json!({

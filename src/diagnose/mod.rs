@@ -309,6 +309,7 @@ pub fn of_logs(
         surprise: decision.surprise,
         closeness: data.closeness,
         window: data.window,
+        lead: data.lead,
     })
 }
 

@@ -100,13 +100,15 @@ pub struct Diagnosis {
     pub closeness: Closeness,
     /// window of the torque channel, samples squared beyond ±1 sample
     pub window: f64,
+    /// time by which the dry friction of the model reverses before the velocity does, s
+    pub lead: f64,
 }
 
 impl Diagnosis {
-    /// Share of the gap on holdout records that vanishes with what was found.
+    /// Share of the gap on holdout records that vanishes with what was found, where they show one.
     pub(super) fn shrink(&self) -> Option<f64> {
-        self.holdout
-            .map(|[before, after]| 1.0 - after / before.max(1e-9))
+        let shown = self.holdout.filter(|[before, _]| *before > 0.0);
+        shown.map(|[before, after]| 1.0 - after / before)
     }
 }
 

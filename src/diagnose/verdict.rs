@@ -49,7 +49,7 @@ pub struct Decision {
     pub verdict: Verdict,
     /// effects by falling confidence
     pub members: Vec<Member>,
-    /// gap energy on holdout records before and after
+    /// gap energy on holdout records before and after; zero where they show none
     pub holdout: [f64; 2],
     /// what the prior says against the refitted parameters, before and after
     pub surprise: [f64; 2],
@@ -125,7 +125,10 @@ pub fn decide(
     Decision {
         verdict,
         members,
-        holdout: [base_held, held],
+        holdout: match st.shows_held(base_held) {
+            true => [base_held, held],
+            false => [0.0; 2],
+        },
         surprise: [surprise, surprise_after],
         unexplained,
         stands_out: shows,

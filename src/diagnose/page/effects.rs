@@ -60,7 +60,7 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
     }
 }
 
-/// The share on holdout records, where there are any.
+/// The share on holdout records, where these show a gap.
 fn held(f: &Finding) -> String {
     f.holdout.map_or("–".into(), percent)
 }
@@ -96,14 +96,14 @@ pub(super) fn shrink(d: &Diagnosis) -> Markup {
                 (r.joints.iter().map(|v| v[i]).sum::<f64>() / n).sqrt()
             };
             let [a, b, c] = [mean(0), mean(1), mean(2)];
-            let share = if b > 0.0 { 1.0 - (c / b).powi(2) } else { 0.0 };
+            let share = (b > 0.0).then(|| 1.0 - (c / b).powi(2));
             vec![
                 html! { (r.name) @for remark in &r.remarks { div { small { (remark) } } } },
                 html! { (if r.fit { "fit" } else { "holdout" }) },
                 html! { (significant(a, 3)) },
                 html! { (significant(b, 3)) },
                 html! { (significant(c, 3)) },
-                html! { (percent(share.max(0.0))) },
+                html! { (share.map_or("–".into(), |s| percent(s.max(0.0)))) },
             ]
         })
         .collect();

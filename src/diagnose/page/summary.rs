@@ -31,6 +31,7 @@ pub(super) fn summary(d: &Diagnosis) -> Markup {
             "of the gap gone on holdout records".into(),
             match shrink {
                 Some(_) => "with the effects found, parameters from the fitted records".into(),
+                None if d.holdout.is_some() && found => "holdout records show no gap".into(),
                 None if d.holdout.is_some() => "no effect was found".into(),
                 None => {
                     "there is no holdout record in which anything moves: this cannot be said".into()

@@ -188,18 +188,19 @@ impl<'a> Beside<'a> {
         }
     }
 
-    /// The same on holdout records.
-    pub fn explains_held(&self) -> f64 {
+    /// The same on holdout records, where these show a gap.
+    pub fn explains_held(&self) -> Option<f64> {
         let st = self.st;
-        if self.held() == 0 {
-            return self.explains();
-        }
         let [w, a] = &self.residual;
         let held = |e: &[Vec<f64>]| self.whole(e, false);
-        match self.frozen {
-            true => 1.0 - held(a) / held(&st.evidence.r).max(1e-9),
-            false => (held(w) - held(a)) / held(&st.fit(&[]).1).max(1e-9),
-        }
+        let [before, gone] = match self.frozen {
+            true => {
+                let before = held(&st.evidence.r);
+                [before, before - held(a)]
+            }
+            false => [held(&st.fit(&[]).1), held(w) - held(a)],
+        };
+        st.shows_held(before).then(|| gone / before)
     }
 
     fn whole(&self, residual: &[Vec<f64>], fit: bool) -> f64 {

@@ -19,8 +19,8 @@ pub struct Member {
     pub together: f64,
     /// share of the gap on fitted records
     pub explains: f64,
-    /// share of the gap on holdout records
-    pub holdout: f64,
+    /// share of the gap on holdout records, where these show one
+    pub holdout: Option<f64>,
     /// share of the effect's energy that the nominal model cannot absorb
     pub visibility: f64,
     /// the most that a decoy gains of its own, over what the effect gains; not of an effect that shows in
@@ -72,7 +72,7 @@ pub fn judge(
         confidence: together / (1.0 + against(st, c.effect, &rivals)),
         together,
         explains: m.explains().clamp(0.0, 1.0),
-        holdout: m.explains_held().clamp(-1.0, 1.0),
+        holdout: m.explains_held().map(|h| h.clamp(-1.0, 1.0)),
         visibility: c.projected.visibility(Some(&c.eta)),
         decoys,
         unsteady,

@@ -107,6 +107,12 @@ impl State<'_> {
             .sum()
     }
 
+    /// Whether a gap on holdout records is one that shares can be taken of.
+    pub fn shows_held(&self, gap: f64) -> bool {
+        let data = self.evidence.data;
+        data.predicts() && gap > T.entry.negligible * (data.rows() - data.fitted) as f64
+    }
+
     /// Penalty of the prior with a set.
     pub fn surprise(&self, fit: &Fit, residual: &[Vec<f64>]) -> f64 {
         let fitted = self.evidence.data.fitted;
