@@ -67,7 +67,12 @@ impl<'a> Searched<'a> {
     /// which was not taken for found and may pass for a delay that is claimed; a window that was found as wide as any.
     pub fn doubts(&self, effects: &[Box<dyn Effect>]) -> Vec<Assumed> {
         let data = self.evidence.data;
-        let late = data.may_lead() && data.lead != T.reversals.usual && self.late(effects) > 0;
+        // one that takes a part of a gap that is not explained need not be sure to be doubted; behind coarse encoders another time
+        // was looked for without this, and a swinging base may pass for what is left
+        let fine = !(0..data.joints()).any(|j| data.filtered(j));
+        let part = |m: &Member| effects[m.candidate.effect].late() && fine && !self.all();
+        let any = self.late(effects) > 0 || self.decision.members.iter().any(part);
+        let late = data.may_lead() && data.lead != T.reversals.usual && any;
         let early = late.then_some(Assumed {
             lead: Some(T.reversals.usual),
             ..Assumed::default()
