@@ -259,7 +259,9 @@ impl Finder<'_> {
                         let mut next = s.shape.clone();
                         next.constants[k] *= factor;
                         let bounds = &bounds.iter().find(|b| b.0 == k)?.1;
-                        bounds.contains(&next[k].abs()).then_some(((k, factor), next))
+                        bounds
+                            .contains(&next[k].abs())
+                            .then_some(((k, factor), next))
                     })
                     .unzip();
                 let tried = match shapes.is_empty() {
@@ -267,8 +269,8 @@ impl Finder<'_> {
                     false => self.tried(s.task, &shapes, true),
                 };
                 let all = tried.into_iter().flatten().map(|t| t.counts());
-                let best = (all.zip(moves).zip(shapes))
-                    .reduce(|a, b| if b.0.0 > a.0.0 { b } else { a });
+                let best =
+                    (all.zip(moves).zip(shapes)).reduce(|a, b| if b.0.0 > a.0.0 { b } else { a });
                 match best {
                     Some(((gain, by), next)) if gain > s.gain * T.shapes.better => {
                         (s.gain, s.shape, came) = (gain, next, Some(by));

@@ -1,8 +1,8 @@
 //! What the search found in records, and whether another search of the same records stands for it.
 //!
 //! A delay of the torque and the time by which a simulator's dry friction reverses early are nearly the same, and a large effect
-//! moves both. So where a delay is claimed, the records are searched once more with the time of a simulator's usual settings. And
-//! what a motion shakes and no effect explains looks like a wide window of the torque: where the widest is found and the gap
+//! moves both. So where a delay is claimed, or takes a part of a gap that is not explained, the records are searched once more with
+//! the time of a simulator's usual settings. And what a motion shakes and no effect explains looks like a wide window of the torque: where the widest is found and the gap
 //! is not explained, they are searched with that of plus and minus one sample.
 
 use super::catalogue::{Context, Effect};
@@ -67,8 +67,8 @@ impl<'a> Searched<'a> {
     /// which was not taken for found and may pass for a delay that is claimed; a window that was found as wide as any.
     pub fn doubts(&self, effects: &[Box<dyn Effect>]) -> Vec<Assumed> {
         let data = self.evidence.data;
-        // one that takes a part of a gap that is not explained need not be sure to be doubted; behind coarse encoders another time
-        // was looked for without this, and a swinging base may pass for what is left
+        // behind coarse encoders a time was looked for without a sign of a simulator, and a swinging base may pass for what another
+        // one leaves
         let fine = !(0..data.joints()).any(|j| data.filtered(j));
         let part = |m: &Member| effects[m.candidate.effect].late() && fine && !self.all();
         let any = self.late(effects) > 0 || self.decision.members.iter().any(part);

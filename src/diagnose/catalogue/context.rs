@@ -144,7 +144,12 @@ impl<'a> Context<'a> {
         let own = plant.actuated()[j];
         for (p, value) in self.data.parameters.iter().zip(&self.phi) {
             for (k, of) in JointTerm::ALL.into_iter().enumerate() {
-                if p.kind == (plant::Column::Term { joint: own, term: of }) {
+                if p.kind
+                    == (plant::Column::Term {
+                        joint: own,
+                        term: of,
+                    })
+                {
                     all[k] = *value;
                 }
             }

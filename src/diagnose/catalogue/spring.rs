@@ -234,7 +234,9 @@ fn ways<const N: usize>(
             }
             match cycle.filter(|cycle| n < count && !out.is_empty() && *cycle + 1 < n) {
                 // its first sample is that after the period: the window of the very first has one side only
-                Some(cycle) => (0..count).map(|i| out[(i + cycle - 1) % cycle + 1]).collect(),
+                Some(cycle) => (0..count)
+                    .map(|i| out[(i + cycle - 1) % cycle + 1])
+                    .collect(),
                 None => out,
             }
         })

@@ -170,7 +170,8 @@ pub struct Reversals {
     /// Least such time that counts in a log that does not look like a simulator's. Unit: s. Source: MuJoCo's default gives
     /// 9.5 ms; of the recordings of three machines one settles at 4.8 ms (the EMPS), the others at 0.
     pub early: f64,
-    /// Such a time of a simulator whose settings nobody has changed: tried where a delay is claimed. Unit: s. Source: MuJoCo's
+    /// Such a time of a simulator whose settings nobody has changed: tried where a delay is claimed, and behind fine encoders where
+    /// one takes a part of a gap that is not explained. Unit: s. Source: MuJoCo's
     /// default `solref`.
     pub usual: f64,
     /// Part of the deceleration by dry friction alone by which a simulator's friction gives way, `(1 − d)/d`. Unit: share.
