@@ -144,6 +144,14 @@ impl Set<'_> {
     }
 }
 
+/// Products of whitened columns on the rows of one actuator.
+struct OfActuator {
+    /// column, and its product with the residual
+    own: Vec<(usize, f64)>,
+    /// `Qᵀ Z`, from the first column of `Q` on that is not zero
+    part: Mat<f64>,
+}
+
 /// Energies of a fit on records.
 #[derive(Debug, Clone, Default)]
 pub struct Energy {
@@ -285,14 +293,14 @@ impl Evidence<'_> {
                 }
             };
             let r = &self.r[j][..fitted];
-            let here = here.into_iter().map(|(i, v)| (i, dot(v, r)));
-            (here.collect::<Vec<_>>(), part, self.first[j])
+            let own = here.iter().map(|(i, v)| (*i, dot(v, r))).collect();
+            OfActuator { own, part }
         };
         let joints = (0..self.data.joints()).into_par_iter().with_max_len(1);
-        let parts: Vec<(Vec<(usize, f64)>, Mat<f64>, usize)> = joints.map(of).collect();
-        for (here, part, first) in parts {
-            for (k, (i, product)) in here.into_iter().enumerate() {
-                for m in first..p {
+        let parts: Vec<OfActuator> = joints.map(of).collect();
+        for (OfActuator { own, part }, first) in parts.into_iter().zip(&self.first) {
+            for (k, (i, product)) in own.into_iter().enumerate() {
+                for m in *first..p {
                     c[(m, i)] += part[(m - first, k)];
                 }
                 b[i] += product;

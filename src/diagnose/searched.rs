@@ -2,8 +2,8 @@
 //!
 //! A delay of the torque and the time by which a simulator's dry friction reverses early are nearly the same, and a large effect
 //! moves both. So where a delay is claimed, or takes a part of a gap that is not explained, the records are searched once more with
-//! the time of a simulator's usual settings. And what a motion shakes and no effect explains looks like a wide window of the torque: where the widest is found and the gap
-//! is not explained, they are searched with that of plus and minus one sample.
+//! the time of a simulator's usual settings. And what a motion shakes and no effect explains looks like a wide window of the torque:
+//! where the widest is found and the gap is not explained, they are searched with that of plus and minus one sample.
 
 use super::catalogue::{Context, Effect};
 use super::data::Data;
