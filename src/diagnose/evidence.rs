@@ -181,8 +181,6 @@ pub struct Evidence<'a> {
     pub phi: Vec<f64>,
     /// `Q` by actuator, rows of all records; from its first column on that is not zero
     q: Vec<Mat<f64>>,
-    /// that column
-    first: Vec<usize>,
     /// `L`
     l: Mat<f64>,
     /// whitened residual of the frozen model by actuator, rows of all records
@@ -219,6 +217,11 @@ fn assembled(set: &[&Projected], block: impl Fn(usize, usize) -> Mat<f64>) -> Ma
 }
 
 impl Evidence<'_> {
+    /// First column of `Q` of an actuator that is not zero.
+    fn first(&self, j: usize) -> usize {
+        self.d.len() - self.q[j].ncols()
+    }
+
     /// `WᵀW` and `Wᵀr` over fitted rows, in units of the prior.
     pub fn normal_equations(&self) -> [Mat<f64>; 2] {
         let gram = &self.l * self.l.transpose() - Mat::<f64>::identity(self.d.len(), self.d.len());
@@ -298,9 +301,10 @@ impl Evidence<'_> {
         };
         let joints = (0..self.data.joints()).into_par_iter().with_max_len(1);
         let parts: Vec<OfActuator> = joints.map(of).collect();
-        for (OfActuator { own, part }, first) in parts.into_iter().zip(&self.first) {
+        for (j, OfActuator { own, part }) in parts.into_iter().enumerate() {
+            let first = self.first(j);
             for (k, (i, product)) in own.into_iter().enumerate() {
-                for m in *first..p {
+                for m in first..p {
                     c[(m, i)] += part[(m - first, k)];
                 }
                 b[i] += product;

@@ -72,22 +72,13 @@ impl Effect for Backlash {
             true => self
                 .drafts(cx, place, std::slice::from_ref(shape))
                 .remove(0),
-            false => {
-                let j = place.first();
-                let carried = |k: usize| spring::carried(cx, j, k);
-                let way =
-                    |r: &Series, k: usize| spring::way(carried(k), r.dt, springs(shape), r.cycle);
-                vec![cx.displaced(j, way)]
-            }
+            false => spring::whole(cx, place.first(), springs(shape)),
         }
     }
 
     fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
-        let (j, springs) = (place.first(), shapes.iter().map(springs));
-        let all = spring::accelerations(cx, j, &springs.collect::<Vec<_>>());
-        (all.iter())
-            .map(|a| vec![cx.inertial(j, a, true)])
-            .collect()
+        let springs: Vec<Springs> = shapes.iter().map(springs).collect();
+        spring::drafts(cx, place.first(), &springs, true)
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {

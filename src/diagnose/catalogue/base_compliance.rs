@@ -79,12 +79,7 @@ impl Effect for BaseCompliance {
                 slopes: [&[], &[]],
                 measured: &r.measured,
             };
-            let springs = Springs {
-                gap: 0.0,
-                frequency: shape[0],
-                damping: shape[1],
-                cubic: 0.0,
-            };
+            let springs = Springs::soft(shape[0], shape[1]);
             spring::way(carried, r.dt, springs, r.cycle)
         })
     }

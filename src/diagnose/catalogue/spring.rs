@@ -1,6 +1,7 @@
 //! A mass on springs, with or without a gap between them.
 
 use super::Context;
+use crate::diagnose::column::Column;
 use crate::diagnose::window::{FINE, from_fine};
 
 /// How much of the begin of a record without periods is run through first: s at most, and swings of the spring.
@@ -48,6 +49,16 @@ pub(crate) struct Springs {
 }
 
 impl Springs {
+    /// A spring without a gap that does not stiffen.
+    pub fn soft(frequency: f64, damping: f64) -> Self {
+        Springs {
+            gap: 0.0,
+            frequency,
+            damping,
+            cubic: 0.0,
+        }
+    }
+
     fn omega(&self) -> f64 {
         2.0 * std::f64::consts::PI * self.frequency
     }
@@ -71,8 +82,24 @@ pub(crate) fn way(
     one
 }
 
+/// Columns of the link of joint `j` on springs, whole.
+pub(crate) fn whole(cx: &Context, j: usize, springs: Springs) -> Vec<Column> {
+    vec![cx.displaced(j, |r, k| way(carried(cx, j, k), r.dt, springs, r.cycle))]
+}
+
+/// The same of several springs by inertia alone, as drafts; with `own_only` on the rows of the joint itself.
+pub(crate) fn drafts(
+    cx: &Context,
+    j: usize,
+    springs: &[Springs],
+    own_only: bool,
+) -> Vec<Vec<Column>> {
+    let all = accelerations(cx, j, springs).into_iter();
+    all.map(|a| vec![cx.inertial(j, &a, own_only)]).collect()
+}
+
 /// Accelerations `δ̈` of the link of joint `j` on one spring after another, over all records (serial robots).
-pub(crate) fn accelerations(cx: &Context, j: usize, springs: &[Springs]) -> Vec<Vec<f64>> {
+fn accelerations(cx: &Context, j: usize, springs: &[Springs]) -> Vec<Vec<f64>> {
     let mut all = vec![Vec::with_capacity(cx.data.rows()); springs.len()];
     for (k, r) in cx.data.records.iter().enumerate() {
         let carried = carried(cx, j, k);
@@ -84,7 +111,7 @@ pub(crate) fn accelerations(cx: &Context, j: usize, springs: &[Springs]) -> Vec<
             let group: Vec<Springs> = rest.take(SIDE).take_while(same).copied().collect();
             let lanes: [Springs; SIDE] = std::array::from_fn(|l| group[l.min(group.len() - 1)]);
             let found = match group.len() {
-                1 => vec![way(carried, r.dt, group[0], r.cycle)],
+                1 => ways(carried, r.dt, [group[0]], r.cycle, 2..3).to_vec(),
                 _ => ways(carried, r.dt, lanes, r.cycle, 2..3).to_vec(),
             };
             let into = all[first..].iter_mut().take(group.len());
@@ -322,16 +349,6 @@ pub(crate) fn constants(cx: &Context, j: usize, frequency: f64, damping: f64) ->
 mod tests {
     use super::*;
 
-    /// A spring without a gap that does not stiffen.
-    fn soft(frequency: f64, damping: f64) -> Springs {
-        Springs {
-            gap: 0.0,
-            frequency,
-            damping,
-            cubic: 0.0,
-        }
-    }
-
     /// Springs, gaps and springs that stiffen do side by side what each does alone.
     #[test]
     fn springs_side_by_side_do_what_each_does_alone() {
@@ -344,7 +361,7 @@ mod tests {
             measured: &vec![true; n],
         };
         let lanes = [[0.0, 0.0], [0.0, 0.5], [0.002, 0.0], [0.01, 0.0]].map(|[gap, cubic]| {
-            let spring = soft(6.5, 0.06);
+            let spring = Springs::soft(6.5, 0.06);
             Springs {
                 gap,
                 cubic,
@@ -382,7 +399,7 @@ mod tests {
             slopes: [&stiff, &[]],
             measured: &vec![true; n],
         };
-        let truth = way(whole, 0.004, soft(6.5, 0.06), Some(cycle));
+        let truth = way(whole, 0.004, Springs::soft(6.5, 0.06), Some(cycle));
         // 26 samples at either end have no accelerations
         let (mut spoiled, mut measured) = (good.clone(), vec![true; n]);
         for i in (0..26).chain(n - 26..n) {
@@ -394,7 +411,7 @@ mod tests {
             measured: &measured,
             ..whole
         };
-        let found = way(cut, 0.004, soft(6.5, 0.06), None);
+        let found = way(cut, 0.004, Springs::soft(6.5, 0.06), None);
         for (k, name) in ["way", "rate", "acceleration"].iter().enumerate() {
             let size = truth[k].iter().fold(0.0f64, |m, v| m.max(v.abs()));
             let off = (30..n - 30).fold(0.0f64, |m, i| m.max((found[k][i] - truth[k][i]).abs()));
@@ -414,7 +431,7 @@ mod tests {
             measured: &vec![true; n],
         };
         let k = (2.0 * std::f64::consts::PI * 5.0f64).powi(2);
-        let found = way(carried, 0.004, soft(5.0, 0.1), None);
+        let found = way(carried, 0.004, Springs::soft(5.0, 0.1), None);
         let stands = 10.0 / (k - 100.0);
         assert!((found[0][n - 1] / stands - 1.0).abs() < 1e-3);
     }

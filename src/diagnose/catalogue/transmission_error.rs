@@ -143,12 +143,7 @@ impl TransmissionError {
             let mut columns = vec![column(&sines), column(&cosines)];
             if shape.form == SPRUNG {
                 if load.as_ref().is_none_or(|l| l.0 != shape[1]) {
-                    let springs = Springs {
-                        gap: 0.0,
-                        frequency: shape[1],
-                        damping: DAMPING,
-                        cubic: 0.0,
-                    };
+                    let springs = Springs::soft(shape[1], DAMPING);
                     let records = cx.data.records.iter().enumerate();
                     let swings = records.map(|(i, r)| {
                         let carried = spring::carried(cx, j, i);

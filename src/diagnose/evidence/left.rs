@@ -67,7 +67,7 @@ impl Evidence<'_> {
         (0..self.data.joints())
             .into_par_iter()
             .map(|j| {
-                let y = &self.q[j] * faer::ColRef::from_slice(&u[self.first[j]..]);
+                let y = &self.q[j] * faer::ColRef::from_slice(&u[self.first(j)..]);
                 let mut e: Vec<f64> = self.r[j]
                     .iter()
                     .enumerate()

@@ -111,7 +111,6 @@ impl<'a> Evidence<'a> {
             data,
             phi,
             q,
-            first,
             l,
             r,
             d,
