@@ -27,6 +27,12 @@ impl Data<'_> {
         }
     }
 
+    /// Whether the gap of an actuator is counted on whitened rows: behind a coarse encoder of a tree. Of closed chains the rows that count
+    /// least have no weight at all.
+    pub fn counts_whitened(&self, j: usize) -> bool {
+        !closed(self.plant) && self.coarse(j)
+    }
+
     /// Whether the lead of a simulator's friction is looked for: it was seen on joints of trees alone.
     pub fn may_lead(&self) -> bool {
         !closed(self.plant)

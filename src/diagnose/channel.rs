@@ -27,6 +27,7 @@ use super::thresholds::THRESHOLDS as T;
 use super::verdict::inflation;
 use crate::error::Result;
 use crate::median::median;
+use crate::signals::series::Series;
 use std::borrow::Cow;
 
 /// What the records say of it.
@@ -48,7 +49,7 @@ impl Channel {
         let phi = e.parameters(&[], &e.fit(&[]));
         let model = data.model_torque(&phi);
         let curved = e.project(&by_joint(data.curvature(&model)));
-        let coarse = (0..data.joints()).any(|j| data.filtered(j));
+        let coarse = (0..data.joints()).any(|j| data.coarse(j));
         // positions that noise is on bend where the torque does not: no window can be seen then
         let found = match coarse {
             true => 0.0,
@@ -62,7 +63,12 @@ impl Channel {
             let found = agreed(&e, &[&curved, &slope], &earlier);
             let more = (lead + step * found.value).clamp(0.0, T.reversals.longest);
             deviation = step * found.deviation;
-            let sure = T.reversals.sure * step * found.sure;
+            // joints that disagree have widened what they agree on already
+            let times = match earlier.z.len() {
+                1 => T.reversals.sure,
+                _ => T.reversals.agreed,
+            };
+            let sure = times * step * found.sure;
             if more > T.reversals.shortest.max(sure) {
                 lead = more;
             }
@@ -169,6 +175,10 @@ impl Data<'_> {
         if !self.may_lead() {
             return Ok(false);
         }
+        let plain = (0..self.joints()).any(|j| self.coarse(j) || self.noise[j].assumed);
+        if plain {
+            self.start_lead()?;
+        }
         let mut least = T.reversals.early;
         for _ in 0..T.reversals.rounds {
             let Channel {
@@ -184,13 +194,35 @@ impl Data<'_> {
                 break;
             }
         }
-        let plain = (0..self.joints()).any(|j| self.filtered(j) || self.noise[j].assumed);
         // the longest that is looked for is no time that was found
         if !plain && !(least..T.reversals.longest).contains(&self.lead) {
             let phi = self.values();
             self.reverse_early(0.0, &phi)?;
         }
         Ok(plain || self.lead > 0.0)
+    }
+
+    /// Starts from the time of a simulator's usual settings where the refitted model leaves less with it. Every joint
+    /// counts by the logarithm of what is left there, as with a noise of its own that is not known, so that an effect of one does not decide.
+    ///
+    /// # Errors
+    /// As [`Data::reverse_early`].
+    fn start_lead(&mut self) -> Result<()> {
+        let nominal = self.values();
+        let mut left = [0.0; 2];
+        let both = [0.0, T.reversals.usual];
+        for (lead, left) in both.into_iter().zip(&mut left) {
+            self.reverse_early(lead, &nominal)?;
+            let e = Evidence::new(self, 1.0);
+            let residual = e.residual(&[], &e.fit(&[]));
+            let power = |r: &Vec<f64>| r[..self.fitted].iter().map(|v| v * v).sum::<f64>();
+            *left = residual
+                .iter()
+                .map(|r| power(r).max(f64::MIN_POSITIVE).ln())
+                .sum();
+        }
+        let better = usize::from(left[1] < left[0]);
+        self.reverse_early(both[better], &nominal)
     }
 
     /// A modelled signal of all records as the torque channel would show it, whitened.
@@ -215,7 +247,13 @@ impl Data<'_> {
         self.passed(j, self.windowed(x))
     }
 
-    /// Whether the encoder of actuator `j` is coarse in any record.
+    /// Whether the encoder of actuator `j` is coarse in any record; of closed chains, where the motion does not repeat.
+    pub(super) fn coarse(&self, j: usize) -> bool {
+        let coarse = |r: &Series| self.may_lead() && r.coarse.get(j) == Some(&true);
+        self.filtered(j) || self.records.iter().any(coarse)
+    }
+
+    /// Whether the positions of actuator `j` have passed a filter in any record: those of a coarse encoder in a motion that does not repeat.
     pub(super) fn filtered(&self, j: usize) -> bool {
         self.records.iter().any(|r| r.filter(j).is_some())
     }

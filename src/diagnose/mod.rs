@@ -318,5 +318,5 @@ pub fn of_logs(
 fn too_much(refit: &[JointGap], data: &Data) -> bool {
     let left = |g: &JointGap| (g.rms / g.noise.max(1e-300)).powi(2);
     let mut joints = refit.iter().enumerate();
-    joints.any(|(j, g)| left(g) > T.gap.left * data.steps_allowance(j))
+    joints.any(|(j, g)| left(g) > T.gap.left * data.allowance(j))
 }

@@ -82,30 +82,22 @@ impl Data<'_> {
         (power / count.max(1.0)).sqrt()
     }
 
-    /// Factor on the gap per row that a sound model may leave on an actuator: more than 1 where its encoder is coarse and
-    /// the noise a small share of the torque, for what the steps of the encoder leave is slow, and whitening takes it for
-    /// white.
-    pub(super) fn allowance(&self, j: usize) -> f64 {
-        if !self.filtered(j) {
-            return 1.0;
-        }
-        self.share_of_torque(j, T.noise.of_coarse).max(1.0)
-    }
-
     /// Power of a share of the torques of an actuator in the fitted records, in units of its noise variance.
     fn share_of_torque(&self, j: usize, share: f64) -> f64 {
         (share * self.torque_rms(j) / self.noise[j].std).powi(2)
     }
 
-    /// The same with what repeats of the steps of a coarse encoder, which is no noise but no gap of the model either. For
-    /// whether there is a gap at all: what is named has to stand out of the rest by itself.
-    pub(super) fn steps_allowance(&self, j: usize) -> f64 {
-        if !self.filtered(j) {
+    /// Factor on the gap per row that a sound model may leave on an actuator, in units of the torque's noise: more than 1 where its
+    /// encoder is coarse, for what repeats of its steps is no noise but no gap of the model either.
+    pub(super) fn allowance(&self, j: usize) -> f64 {
+        if !self.coarse(j) {
             return 1.0;
         }
         let steps = 1.0 + T.noise.of_steps * self.noise[j].excess;
         let most = self.share_of_torque(j, T.noise.most_of_steps);
-        steps.min(most).max(self.allowance(j))
+        steps
+            .min(most)
+            .max(self.share_of_torque(j, T.noise.of_coarse).max(1.0))
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.

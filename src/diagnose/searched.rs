@@ -69,7 +69,7 @@ impl<'a> Searched<'a> {
         let data = self.evidence.data;
         // behind coarse encoders a time was looked for without a sign of a simulator, and a swinging base may pass for what another
         // one leaves
-        let fine = !(0..data.joints()).any(|j| data.filtered(j));
+        let fine = !(0..data.joints()).any(|j| data.coarse(j));
         let part = |m: &Member| effects[m.candidate.effect].late() && fine && !self.all();
         let any = self.late(effects) > 0 || self.decision.members.iter().any(part);
         let late = data.may_lead() && data.lead != T.reversals.usual && any;

@@ -49,6 +49,8 @@ pub struct Series {
     pub position_noise: Vec<f64>,
     /// highest frequency with motion in it, Hz
     pub band: f64,
+    /// whether its encoder is coarse, by actuator; empty where none is
+    pub coarse: Vec<bool>,
     /// what the positions of coarse encoders passed, by actuator; empty where none is coarse
     pub filters: Vec<Option<Filter>>,
     /// what the robot carried
@@ -290,6 +292,7 @@ impl Series {
             motion,
             noise: position_noise,
             band,
+            coarse,
             filters,
         } = differentiated(&q, &steps, count, cycles, dt);
         let reference = reference.map(|columns| {
@@ -320,6 +323,7 @@ impl Series {
             standing,
             position_noise,
             band,
+            coarse,
             filters,
             payload: log.payload,
             order: 0,

@@ -94,10 +94,14 @@ fn periodic(
         .zip(steps)
         .map(|(v, s)| v.max(*s).sqrt())
         .collect();
+    // what a motion that repeats leaves of the steps no filter takes
+    let rows = q.chunks(count.max(1)).zip(steps);
+    let coarse = rows.map(|(row, s)| *s > 0.0 && Filter::of(row, *s, dt).is_some());
     Differentiated {
         motion: out,
         noise,
         band,
+        coarse: coarse.collect(),
         filters: Vec::new(),
     }
 }
@@ -110,6 +114,8 @@ pub struct Differentiated {
     pub noise: Vec<f64>,
     /// highest frequency with motion in it, Hz; 0 where none stands out
     pub band: f64,
+    /// whether the encoder is coarse, by row
+    pub coarse: Vec<bool>,
     /// what the positions of coarse encoders passed, by row; empty where the motion repeats
     pub filters: Vec<Option<Filter>>,
 }
@@ -198,6 +204,7 @@ fn smooth(q: &[f64], steps: &[f64], count: usize, dt: f64) -> Differentiated {
         motion: out,
         noise,
         band: SMOOTH,
+        coarse: filters.iter().map(Option::is_some).collect(),
         filters,
     }
 }

@@ -87,6 +87,7 @@ fn record(plant: &Plant, x: &Samples, tau: Vec<f64>) -> Series {
         standing: Vec::new(),
         position_noise: vec![0.0; n],
         band: 20.0,
+        coarse: Vec::new(),
         filters: Vec::new(),
         payload: crate::log::Payload::None,
         order: 0,

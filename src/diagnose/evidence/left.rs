@@ -97,6 +97,17 @@ impl Evidence<'_> {
         self.data.told(self.data.silenced(before))
     }
 
+    /// Energy of a whitened residual of an actuator beyond that of its noise, on the fitted records or the others; whitening has taken what
+    /// its encoder makes unknown for noise.
+    pub fn beyond(&self, j: usize, e: &[f64], fitted: bool) -> f64 {
+        let data = self.data;
+        let records = data.records.iter().enumerate();
+        let rows = records.filter(|(_, r)| r.fit == fitted);
+        rows.flat_map(|(k, _)| data.span(k))
+            .map(|i| e[i] * e[i] - data.weights[j][i] * data.weights[j][i])
+            .sum()
+    }
+
     /// What the nominal model leaves of the torque beside a fitted set, by actuator, N m or N; zero
     /// where nothing was measured.
     pub fn torque_left(&self, set: &[&Projected]) -> Vec<Vec<f64>> {

@@ -196,6 +196,7 @@ impl Trial<'_> {
             standing,
             position_noise: vec![0.0; n],
             band: T.next.band,
+            coarse: Vec::new(),
             filters: Vec::new(),
             payload: Payload::None,
             order: 0,

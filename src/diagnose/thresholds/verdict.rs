@@ -82,6 +82,9 @@ pub struct Confidence {
     /// Fall of the residual on holdout records over the fall that the fit predicts. Unit: share. Source: by
     /// hand: half is what an effect of three quarters of the fitted strength gives.
     pub predicts: Gate,
+    /// The same fall, beyond which more is there than the fit predicts. Unit: share. Source: arms in MuJoCo: wrong names had 1.83 to 2.43, right ones 1.79
+    /// at most.
+    pub exceeds: Gate,
     /// The same on fitted rows of each of two joints. Unit: share. Source: as `confidence.predicts`.
     pub on_both: Gate,
     /// What counts for a joint of a pair that is too noisy to show it. Unit: 0 to 1. Source: by hand.
@@ -125,6 +128,7 @@ pub(super) const CONFIDENCE: Confidence = Confidence {
     gain: gate(GAIN, 0.02),
     surprise: gate(SURPRISE, 12.0),
     predicts: HALF,
+    exceeds: gate(2.0, 0.06),
     on_both: HALF,
     not_seen: 0.3,
     unseen: 25.0,

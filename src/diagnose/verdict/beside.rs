@@ -188,10 +188,18 @@ impl<'a> Beside<'a> {
         }
     }
 
-    /// The same on holdout records, where these show a gap.
+    /// The same on holdout records, where these show a gap on its joints.
     pub fn explains_held(&self) -> Option<f64> {
         let st = self.st;
         let [w, a] = &self.residual;
+        let without = match self.frozen {
+            true => st.gap(&st.evidence.r, false),
+            false => st.gap(w, false),
+        };
+        let own: f64 = self.joints.iter().map(|j| without[*j].max(0.0)).sum();
+        if !st.shows_held(own) {
+            return None;
+        }
         let held = |e: &[Vec<f64>]| self.whole(e, false);
         let [before, gone] = match self.frozen {
             true => {

@@ -95,6 +95,7 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
         * unsteady.map_or(1.0, |u| T.confidence.unsteady.below(u))
         * if m.frozen { 1.0 } else { m.matters }
         * T.confidence.predicts.above(predicted)
+        * T.confidence.exceeds.below(predicted)
         * decoys.map_or(1.0, |d| T.confidence.decoys.below(d))
         * explains_enough(m, rivals)
         * beside_larger(m)

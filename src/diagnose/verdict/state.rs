@@ -21,8 +21,6 @@ pub struct State<'a> {
     pub total: f64,
     /// what the prior expects its own penalty to be
     pub freedoms: f64,
-    /// factor on the gap per row that a sound model may leave, by actuator
-    pub allowance: Vec<f64>,
 }
 
 impl<'a> State<'a> {
@@ -39,9 +37,6 @@ impl<'a> State<'a> {
             floor: 0.0,
             total: 0.0,
             freedoms: evidence.freedoms(),
-            allowance: (0..evidence.data.joints())
-                .map(|j| evidence.data.allowance(j))
-                .collect(),
         };
         let rows = evidence.data.fitted as f64;
         let before = st.gap(&st.fit(&[]).1, true);
@@ -86,13 +81,27 @@ impl State<'_> {
         (fit, residual)
     }
 
-    /// Gap by actuator on fitted records.
+    /// Gap by actuator on fitted records, or on the others. Behind a coarse encoder most of what a sound model leaves is
+    /// what the encoder makes unknown, and the gap in units of the torque's noise is a small difference of large numbers: it is counted on whitened rows.
     pub fn gap(&self, residual: &[Vec<f64>], fitted: bool) -> Vec<f64> {
+        let data = self.evidence.data;
         let plain = self.evidence.unwhitened(residual);
-        gap::energies(self.evidence.data, &plain, |r| r.fit == fitted)
-            .into_iter()
-            .map(|[a, b]| a + b)
-            .collect()
+        let all = gap::energies(data, &plain, |r| r.fit == fitted);
+        let of = |(j, [repeating, other]): (usize, [f64; 2])| match data.counts_whitened(j) {
+            true => self.evidence.beyond(j, &residual[j], fitted),
+            false => repeating + other,
+        };
+        all.into_iter().enumerate().map(of).collect()
+    }
+
+    /// The largest gap of an actuator over what a sound model may leave beside the noise of its torque.
+    pub fn largest(&self, gap: &[f64]) -> f64 {
+        let data = self.evidence.data;
+        let of = |(j, v): (usize, &f64)| match data.counts_whitened(j) {
+            true => *v,
+            false => v / data.allowance(j),
+        };
+        gap.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// Gap of all actuators above what a sound model leaves.
@@ -149,13 +158,14 @@ impl State<'_> {
             let floor = self.floor * rows;
             joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
         };
-        let seen = (over(without) - over(with)) / over(without).max(1e-9);
         let explains = (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9);
-        let allowed = |j: usize| without[j] / self.allowance[j];
-        // a coarse encoder leaves something on any joint
-        let coarse = self.allowance.iter().any(|a| *a > 1.0);
-        let counted = (0..without.len()).filter(|j| !coarse || joints.contains(j));
-        let there = counted.map(allowed).fold(0.0, f64::max) / rows;
+        // a refit moves what lives in parameters to other joints
+        let moved = over(without) == 0.0 && self.effects[c.effect].hides();
+        let seen = match moved {
+            true => explains,
+            false => (over(without) - over(with)) / over(without).max(1e-9),
+        };
+        let there = self.largest(without) / rows;
         let own = joints.iter().fold(0.0f64, |m, j| m.max(without[*j])) / rows;
         let ringing = match self.effects[c.effect].rings(&c.shape) {
             true => T.matters.ringing.above(own),
