@@ -247,10 +247,10 @@ impl Data<'_> {
         self.passed(j, self.windowed(x))
     }
 
-    /// Whether the encoder of actuator `j` is coarse in any record; of closed chains, where the motion does not repeat.
+    /// Whether the encoder of actuator `j` is coarse: in a record that does not repeat or, of trees, in every record.
     pub(super) fn coarse(&self, j: usize) -> bool {
-        let coarse = |r: &Series| self.may_lead() && r.coarse.get(j) == Some(&true);
-        self.filtered(j) || self.records.iter().any(coarse)
+        let coarse = |r: &Series| r.coarse.get(j) == Some(&true);
+        self.filtered(j) || self.may_lead() && self.records.iter().all(coarse)
     }
 
     /// Whether the positions of actuator `j` have passed a filter in any record: those of a coarse encoder in a motion that does not repeat.
