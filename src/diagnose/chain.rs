@@ -27,6 +27,12 @@ impl Data<'_> {
         }
     }
 
+    /// Whether the encoder of actuator `j` is coarse: in a record that does not repeat or, of trees, in every record.
+    pub fn coarse(&self, j: usize) -> bool {
+        let every = || self.records.iter().all(|r| r.coarse.get(j) == Some(&true));
+        self.filtered(j) || !closed(self.plant) && every()
+    }
+
     /// Whether the gap of an actuator is counted on whitened rows: behind a coarse encoder of a tree. Of closed chains the rows that count
     /// least have no weight at all.
     pub fn counts_whitened(&self, j: usize) -> bool {

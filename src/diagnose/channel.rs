@@ -27,7 +27,6 @@ use super::thresholds::THRESHOLDS as T;
 use super::verdict::inflation;
 use crate::error::Result;
 use crate::median::median;
-use crate::signals::series::Series;
 use std::borrow::Cow;
 
 /// What the records say of it.
@@ -245,12 +244,6 @@ impl Data<'_> {
     /// A modelled signal of all records as [`Data::torque`] would show it.
     pub fn shown(&self, j: usize, x: &[f64]) -> Vec<f64> {
         self.passed(j, self.windowed(x))
-    }
-
-    /// Whether the encoder of actuator `j` is coarse: in a record that does not repeat or, of trees, in every record.
-    pub(super) fn coarse(&self, j: usize) -> bool {
-        let coarse = |r: &Series| r.coarse.get(j) == Some(&true);
-        self.filtered(j) || self.may_lead() && self.records.iter().all(coarse)
     }
 
     /// Whether the positions of actuator `j` have passed a filter in any record: those of a coarse encoder in a motion that does not repeat.

@@ -114,8 +114,9 @@ pub fn decide(
     // a set that cannot be told apart explains as well as its one right member
     let claimed = members.iter().any(claims);
     let shows = stands_out(&st, &before);
+    let left_there = held_out(&st, &hold_after);
     let remains = stands_out(&st, &after) && unexplained > T.gap.unexplained
-        || held_out(&st, &hold_after) && held / base_held.max(1e-9) > T.gap.unexplained;
+        || left_there && held / base_held.max(1e-9) > T.gap.unexplained;
     // a gap that is on other joints than the claims, and too small to count, says nothing of them
     let told = !claimed || members.iter().any(|m| claims(m) && m.holdout.is_some());
     let verdict = match (shows || surprising, claimed) {
@@ -127,7 +128,7 @@ pub fn decide(
     Decision {
         verdict,
         members,
-        holdout: match st.shows_held(base_held) && (told || held_out(&st, &hold_after)) {
+        holdout: match st.shows_held(base_held) && (told || left_there) {
             true => [base_held, held],
             false => [0.0; 2],
         },

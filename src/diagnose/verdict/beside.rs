@@ -193,22 +193,20 @@ impl<'a> Beside<'a> {
         let st = self.st;
         let [w, a] = &self.residual;
         let without = match self.frozen {
-            true => st.gap(&st.evidence.r, false),
-            false => st.gap(w, false),
+            true => &st.evidence.r,
+            false => w,
         };
+        let without = st.gap(without, false);
         let own: f64 = self.joints.iter().map(|j| without[*j].max(0.0)).sum();
         if !st.shows_held(own) {
             return None;
         }
-        let held = |e: &[Vec<f64>]| self.whole(e, false);
-        let [before, gone] = match self.frozen {
-            true => {
-                let before = held(&st.evidence.r);
-                [before, before - held(a)]
-            }
-            false => [held(&st.fit(&[]).1), held(w) - held(a)],
+        let here = st.above(&without, false);
+        let before = match self.frozen {
+            true => here,
+            false => self.whole(&st.fit(&[]).1, false),
         };
-        st.shows_held(before).then(|| gone / before)
+        (st.shows_held(before)).then(|| (here - self.whole(a, false)) / before)
     }
 
     fn whole(&self, residual: &[Vec<f64>], fit: bool) -> f64 {

@@ -21,6 +21,8 @@ pub struct State<'a> {
     pub total: f64,
     /// what the prior expects its own penalty to be
     pub freedoms: f64,
+    /// factor on the gap per row that a sound model may leave, by actuator; 1 where it is counted on whitened rows
+    allowance: Vec<f64>,
 }
 
 impl<'a> State<'a> {
@@ -30,6 +32,11 @@ impl<'a> State<'a> {
         cx: &'a Context<'a>,
         effects: &'a [Box<dyn Effect>],
     ) -> Self {
+        let data = evidence.data;
+        let allowance = (0..data.joints()).map(|j| match data.counts_whitened(j) {
+            true => 1.0,
+            false => data.allowance(j),
+        });
         let mut st = State {
             evidence,
             cx,
@@ -37,6 +44,7 @@ impl<'a> State<'a> {
             floor: 0.0,
             total: 0.0,
             freedoms: evidence.freedoms(),
+            allowance: allowance.collect(),
         };
         let rows = evidence.data.fitted as f64;
         let before = st.gap(&st.fit(&[]).1, true);
@@ -96,12 +104,8 @@ impl State<'_> {
 
     /// The largest gap of an actuator over what a sound model may leave beside the noise of its torque.
     pub fn largest(&self, gap: &[f64]) -> f64 {
-        let data = self.evidence.data;
-        let of = |(j, v): (usize, &f64)| match data.counts_whitened(j) {
-            true => *v,
-            false => v / data.allowance(j),
-        };
-        gap.iter().enumerate().map(of).fold(0.0, f64::max)
+        let joints = gap.iter().zip(&self.allowance);
+        joints.map(|(v, allowed)| v / allowed).fold(0.0, f64::max)
     }
 
     /// Gap of all actuators above what a sound model leaves.
