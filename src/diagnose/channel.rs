@@ -29,8 +29,17 @@ use crate::error::Result;
 use crate::median::median;
 use std::borrow::Cow;
 
+/// What is not looked for in a log, but assumed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Assumed {
+    /// time by which dry friction reverses early, s
+    pub lead: Option<f64>,
+    /// variance of the window of the torque beyond plus and minus one sample, samples squared
+    pub window: Option<f64>,
+}
+
 /// What the records say of it.
-pub struct Channel {
+struct Channel {
     /// variance of the window beyond plus and minus one sample, samples squared
     pub window: f64,
     /// time by which dry friction reverses before the velocity does, s
@@ -43,7 +52,7 @@ pub struct Channel {
 
 impl Channel {
     /// From records with the window and the lead found so far; with `leads` another lead is looked for.
-    pub fn of(data: &Data, leads: bool) -> Channel {
+    fn of(data: &Data, leads: bool) -> Channel {
         let e = Evidence::new(data, 1.0);
         let phi = e.parameters(&[], &e.fit(&[]));
         let model = data.model_torque(&phi);
@@ -163,6 +172,27 @@ fn window(found: f64) -> f64 {
 }
 
 impl Data<'_> {
+    /// With what the log makes of a torque, as far as it is not assumed, and then with what the encoders cannot resolve.
+    ///
+    /// # Errors
+    /// As [`Data::reverse_early`].
+    pub fn as_shown(mut self, assumed: Assumed) -> Result<Self> {
+        let phi = self.values();
+        self.reverse_early(assumed.lead.unwrap_or(0.0), &phi)?;
+        let leads = assumed.lead.is_none() && self.find_lead()?;
+        for pass in 0..2 {
+            let channel = Channel::of(&self, leads);
+            self.window = assumed.window.unwrap_or(channel.window);
+            self.reverse_early(channel.lead, &channel.phi)?;
+            if pass == 0 {
+                let residual = self.gap_to(&self.model_torque(&channel.phi));
+                self.limit_excess(&residual);
+            }
+            self.start_from_load(&channel.phi);
+        }
+        Ok(self)
+    }
+
     /// Takes dry friction to reverse as early as the records show; whether another lead may still be found. Less
     /// than `reversals.early`, which a machine may have, counts only where the log looks like a simulator's: coarse
     /// encoders, or no noise. Elsewhere it must also exceed eight deviations of what the model leaves, so that no large
@@ -170,7 +200,7 @@ impl Data<'_> {
     ///
     /// # Errors
     /// As [`Data::reverse_early`].
-    pub fn find_lead(&mut self) -> Result<bool> {
+    fn find_lead(&mut self) -> Result<bool> {
         if !self.may_lead() {
             return Ok(false);
         }

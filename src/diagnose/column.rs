@@ -1,5 +1,7 @@
 //! A column of a linear model on the rows of some actuators.
 
+use std::sync::Arc;
+
 /// A column of a linear model: values on the rows of some actuators, all records one after another
 /// (the fitted ones first).
 #[derive(Debug, Clone, Default)]
@@ -47,11 +49,12 @@ impl Column {
     }
 }
 
-/// The columns of the nominal model on the rows of one actuator; those of zeros take no room.
+/// The columns of the nominal model on the rows of one actuator; those of zeros take no room, nor does what a clone has in common
+/// with its original.
 #[derive(Debug, Clone, Default)]
 pub struct Columns {
     rows: usize,
-    all: Vec<Option<Vec<f64>>>,
+    all: Vec<Option<Arc<Vec<f64>>>>,
 }
 
 impl Columns {
@@ -63,17 +66,19 @@ impl Columns {
 
     /// A column, where it is not zero.
     pub fn get(&self, c: usize) -> Option<&[f64]> {
-        self.all[c].as_deref()
+        self.all[c].as_deref().map(Vec::as_slice)
     }
 
     /// A column to be written.
     pub fn write(&mut self, c: usize) -> &mut [f64] {
-        self.all[c].get_or_insert_with(|| vec![0.0; self.rows])
+        let zeros = || Arc::new(vec![0.0; self.rows]);
+        let column: &mut Vec<f64> = Arc::make_mut(self.all[c].get_or_insert_with(zeros));
+        column
     }
 
     /// Adds a column.
     pub fn push(&mut self, column: Option<Vec<f64>>) {
-        self.all.push(column);
+        self.all.push(column.map(Arc::new));
     }
 
     /// The sum of all with these coefficients.
@@ -83,7 +88,7 @@ impl Columns {
             let Some(column) = column.as_ref().filter(|_| *x != 0.0) else {
                 continue;
             };
-            out.iter_mut().zip(column).for_each(|(o, v)| *o += x * v);
+            out.iter_mut().zip(column.iter()).for_each(|(o, v)| *o += x * v);
         }
         out
     }

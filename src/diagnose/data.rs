@@ -15,6 +15,7 @@ use crate::signals::series::Series;
 use rayon::prelude::*;
 
 /// The records of an experiment with everything that does not depend on an effect.
+#[derive(Clone)]
 pub struct Data<'a> {
     /// the robot
     pub plant: &'a Plant,

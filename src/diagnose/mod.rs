@@ -85,11 +85,11 @@ use crate::error::{Error, Result};
 use crate::log::{self, Experiment, Purpose};
 use crate::plant::Plant;
 use crate::signals::series::Series;
-use channel::Channel;
+use channel::Assumed;
 use data::Data;
 use payload::Loads;
 use rayon::prelude::*;
-use searched::{Assumed, Searched};
+use searched::Searched;
 use std::borrow::Cow;
 
 #[doc(hidden)]
@@ -99,16 +99,11 @@ use std::borrow::Cow;
 /// No record to fit to, records that are too short or hold too few sound samples, a payload that cannot be
 /// honoured, poses that cannot be reached.
 pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
-    prepare_with(plant, logs, Loads::One, Assumed::default())
+    gathered(plant, logs, Loads::One)?.as_shown(Assumed::default())
 }
 
-/// The same with one unknown load, or one by record, and with what is not looked for.
-fn prepare_with<'a>(
-    plant: &'a Plant,
-    logs: &[log::Record],
-    loads: Loads,
-    assumed: Assumed,
-) -> Result<Data<'a>> {
+/// Records before anything is said of what the log makes of a torque, with one unknown load, or one by record.
+fn gathered<'a>(plant: &'a Plant, logs: &[log::Record], loads: Loads) -> Result<Data<'a>> {
     if !logs.iter().any(|r| r.purpose == Purpose::Fit) {
         return Err(Error::Infeasible(
             "the experiment has no record with use = \"fit\"; name at least one".into(),
@@ -123,20 +118,6 @@ fn prepare_with<'a>(
     let mut data = Data::new(plant, records)?;
     data.ordinary();
     data.carry(loads)?;
-    // what the log makes of a torque, then what the encoders cannot resolve
-    let phi = data.values();
-    data.reverse_early(assumed.lead.unwrap_or(0.0), &phi)?;
-    let leads = assumed.lead.is_none() && data.find_lead()?;
-    for pass in 0..2 {
-        let channel = Channel::of(&data, leads);
-        data.window = assumed.window.unwrap_or(channel.window);
-        data.reverse_early(channel.lead, &channel.phi)?;
-        if pass == 0 {
-            let residual = data.gap_to(&data.model_torque(&channel.phi));
-            data.limit_excess(&residual);
-        }
-        data.start_from_load(&channel.phi);
-    }
     Ok(data)
 }
 
@@ -172,42 +153,49 @@ pub fn diagnose(
 ///
 /// # Errors
 /// As [`prepare`].
-pub fn of_logs(
-    plant: &Plant,
+pub fn of_logs<'a>(
+    plant: &'a Plant,
     logs: &[log::Record],
     settings: &Settings,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
     progress("noise and nominal model");
-    let mut data = prepare(plant, logs)?;
     let mut logs = Cow::Borrowed(logs);
+    let mut plain = gathered(plant, &logs, Loads::One)?;
+    let mut data = plain.clone().as_shown(Assumed::default())?;
     let mut carried = carried::find(&mut data)?;
-    if let Some(found) = &carried {
+    let mut with = |found: &carried::Carried, data: &mut Data<'a>| -> Result<()> {
         logs = Cow::Owned(found.stated(&logs));
-        data = prepare_with(plant, &logs, found.loads, Assumed::default())?;
+        plain = gathered(plant, &logs, found.loads)?;
+        *data = plain.clone().as_shown(Assumed::default())?;
+        Ok(())
+    };
+    if let Some(found) = &carried {
+        with(found, &mut data)?;
     }
     if let Some(found) = carried::remounted(&mut data)? {
-        logs = Cow::Owned(found.stated(&logs));
-        data = prepare_with(plant, &logs, found.loads, Assumed::default())?;
+        with(&found, &mut data)?;
         carried.iter_mut().for_each(|c| c.loads = found.loads);
     }
     let logs = logs.as_ref();
     let effects = catalogue::all();
     closeness::tighten(&mut data, &effects)?;
     let first = Searched::of(&data, &effects, progress)?;
-    let loads = carried.as_ref().map_or(Loads::One, |c| c.loads);
     let others = first.doubts(&effects).into_iter().map(|assumed| {
-        let mut data = prepare_with(plant, logs, loads, assumed)?;
+        let mut data = plain.clone().as_shown(assumed)?;
         closeness::tighten(&mut data, &effects)?;
         Ok(data)
     });
     let others = others.collect::<Result<Vec<Data>>>()?;
+    drop(plain);
     let mut found = first;
     for data in &others {
+        let before = found.set_aside(&effects);
         let other = Searched::of(data, &effects, progress)?;
-        if other.stands_for(&found, &effects) {
-            found = other;
-        }
+        found = match other.stands_for(&before, &effects) {
+            true => other,
+            false => before.taken_up(),
+        };
     }
     let Searched {
         evidence,

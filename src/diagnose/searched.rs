@@ -6,6 +6,7 @@
 //! where the widest is found and the gap is not explained, they are searched with that of plus and minus one sample.
 
 use super::catalogue::{Context, Effect};
+use super::channel::Assumed;
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
 use super::search::{Candidate, singles};
@@ -14,15 +15,6 @@ use super::thresholds::THRESHOLDS as T;
 use super::verdict::{Decision, Member, Verdict, decide, inflation};
 use crate::error::Result;
 use std::cmp::Ordering;
-
-/// What is not looked for in a log, but assumed.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Assumed {
-    /// time by which dry friction reverses early, s
-    pub lead: Option<f64>,
-    /// variance of the window of the torque beyond plus and minus one sample, samples squared
-    pub window: Option<f64>,
-}
 
 /// What the search found in records.
 pub struct Searched<'a> {
@@ -85,16 +77,29 @@ impl<'a> Searched<'a> {
         early.into_iter().chain(plain).collect()
     }
 
+    /// Without the decomposed model, which is the most that a search holds, until it is taken up again.
+    pub fn set_aside(self, effects: &[Box<dyn Effect>]) -> Aside<'a> {
+        Aside {
+            late: self.late(effects),
+            left: self.left(),
+            margin: self.margin(),
+            data: self.evidence.data,
+            cx: self.cx,
+            list: self.list,
+            decision: self.decision,
+        }
+    }
+
     /// Whether it explains the records with fewer of the effects that the other claims: as well as what that one leaves
     /// allows, or, without any of them, all that counts, where the other took friction to reverse early, too. Or with no more
     /// of them, and clearly better.
-    pub fn stands_for(&self, other: &Searched, effects: &[Box<dyn Effect>]) -> bool {
+    pub fn stands_for(&self, other: &Aside, effects: &[Box<dyn Effect>]) -> bool {
         let all = self.all();
-        let as_well = || self.left() < other.left() + other.margin();
+        let as_well = || self.left() < other.left + other.margin;
         let late = self.late(effects);
-        let none = late == 0 && all && other.evidence.data.lead > 0.0;
-        let better = || self.left() + other.margin() < other.left();
-        match late.cmp(&other.late(effects)) {
+        let none = late == 0 && all && other.data.lead > 0.0;
+        let better = || self.left() + other.margin < other.left;
+        match late.cmp(&other.late) {
             Ordering::Less => none || as_well(),
             Ordering::Equal => better(),
             Ordering::Greater => false,
@@ -130,5 +135,31 @@ impl<'a> Searched<'a> {
         let residual = (self.evidence).residual(&members, &self.evidence.fit(&members));
         let scale = inflation(&residual, self.evidence.data.fitted);
         (T.reversals.sure * scale).powi(2)
+    }
+}
+
+/// What another search is compared with.
+pub struct Aside<'a> {
+    data: &'a Data<'a>,
+    cx: Context<'a>,
+    list: Vec<Candidate>,
+    decision: Decision,
+    /// effects that it claims and early friction may pass for
+    late: usize,
+    /// `χ²` with what it claims
+    left: f64,
+    /// by how much another `χ²` may be higher and count as no worse
+    margin: f64,
+}
+
+impl<'a> Aside<'a> {
+    /// The search as it was.
+    pub fn taken_up(self) -> Searched<'a> {
+        Searched {
+            evidence: Evidence::new(self.data, 1.0),
+            cx: self.cx,
+            list: self.list,
+            decision: self.decision,
+        }
     }
 }
