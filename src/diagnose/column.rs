@@ -88,7 +88,9 @@ impl Columns {
             let Some(column) = column.as_ref().filter(|_| *x != 0.0) else {
                 continue;
             };
-            out.iter_mut().zip(column.iter()).for_each(|(o, v)| *o += x * v);
+            out.iter_mut()
+                .zip(column.iter())
+                .for_each(|(o, v)| *o += x * v);
         }
         out
     }

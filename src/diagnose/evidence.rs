@@ -26,7 +26,8 @@ use super::column::Column;
 use super::data::Data;
 use algebra::{dot, overlap};
 use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use faer::linalg::triangular_solve;
+use faer::{Mat, Par, Side};
 use rayon::prelude::*;
 
 /// Columns of an effect, whitened and reduced by the nominal model.
@@ -144,11 +145,20 @@ impl Set<'_> {
     }
 }
 
+/// The whitened columns of the nominal model on the rows of one actuator in units of the prior, `W = B R`: `B` are those that
+/// show apart from each other in its torque, a half or a third of all.
+struct Basis {
+    /// `B`, rows of all records
+    b: Mat<f64>,
+    /// `R`, with a column for each parameter
+    r: Mat<f64>,
+}
+
 /// Products of whitened columns on the rows of one actuator.
 struct OfActuator {
     /// column, and its product with the residual
     own: Vec<(usize, f64)>,
-    /// `Qᵀ Z`, from the first column of `Q` on that is not zero
+    /// `Wᵀ Z`, a column for each of `own`
     part: Mat<f64>,
 }
 
@@ -179,8 +189,8 @@ pub struct Evidence<'a> {
     pub data: &'a Data<'a>,
     /// nominal parameters
     pub phi: Vec<f64>,
-    /// `Q` by actuator, rows of all records; from its first column on that is not zero
-    q: Vec<Mat<f64>>,
+    /// `W` by actuator, in units of the prior
+    w: Vec<Basis>,
     /// `L`
     l: Mat<f64>,
     /// whitened residual of the frozen model by actuator, rows of all records
@@ -217,11 +227,6 @@ fn assembled(set: &[&Projected], block: impl Fn(usize, usize) -> Mat<f64>) -> Ma
 }
 
 impl Evidence<'_> {
-    /// First column of `Q` of an actuator that is not zero.
-    fn first(&self, j: usize) -> usize {
-        self.d.len() - self.q[j].ncols()
-    }
-
     /// `WᵀW` and `Wᵀr` over fitted rows, in units of the prior.
     pub fn normal_equations(&self) -> [Mat<f64>; 2] {
         let gram = &self.l * self.l.transpose() - Mat::<f64>::identity(self.d.len(), self.d.len());
@@ -258,6 +263,22 @@ impl Evidence<'_> {
         [&self.l * &a.c, own, with]
     }
 
+    /// `L⁻¹` of the columns of a matrix.
+    fn reduce(&self, columns: &mut Mat<f64>) {
+        triangular_solve::solve_lower_triangular_in_place(
+            self.l.as_ref(),
+            columns.as_mut(),
+            Par::Seq,
+        );
+    }
+
+    /// `L⁻ᵀ` of a vector.
+    fn restored(&self, u: &[f64]) -> Mat<f64> {
+        let mut x = Mat::from_fn(u.len(), 1, |i, _| u[i]);
+        triangular_solve::solve_upper_triangular_in_place(self.l.transpose(), x.as_mut(), Par::Seq);
+        x
+    }
+
     /// Whitens and reduces columns.
     pub fn project(&self, columns: &[Column]) -> Projected {
         self.project_all(std::slice::from_ref(&columns.to_vec()))
@@ -280,36 +301,38 @@ impl Evidence<'_> {
         let flat: Vec<&Column> = z.iter().flatten().collect();
         let mut c = Mat::<f64>::zeros(p, flat.len());
         let mut b = vec![0.0; flat.len()];
-        // of every actuator by itself: the columns on its rows, their products with Q and with the residual
+        // of every actuator by itself: the columns on its rows, their products with W and with the residual
         let of = |j: usize| {
             let at = flat.iter().enumerate();
             let here: Vec<(usize, &[f64])> = at
                 .filter_map(|(i, c)| Some((i, &c.get(j)?[..fitted])))
                 .collect();
-            let q = self.q[j].subrows(0, fitted);
+            let w = &self.w[j];
+            let b = w.b.subrows(0, fitted);
             let part = match here[..] {
-                [] => Mat::zeros(q.ncols(), 0),
-                [(_, v)] => q.transpose() * faer::ColRef::from_slice(v).as_mat(),
+                [] => Mat::zeros(b.ncols(), 0),
+                [(_, v)] => b.transpose() * faer::ColRef::from_slice(v).as_mat(),
                 _ => {
                     let block = Mat::from_fn(fitted, here.len(), |r, i| here[i].1[r]);
-                    q.transpose() * &block
+                    b.transpose() * &block
                 }
             };
+            let part = w.r.transpose() * part;
             let r = &self.r[j][..fitted];
             let own = here.iter().map(|(i, v)| (*i, dot(v, r))).collect();
             OfActuator { own, part }
         };
         let joints = (0..self.data.joints()).into_par_iter().with_max_len(1);
         let parts: Vec<OfActuator> = joints.map(of).collect();
-        for (j, OfActuator { own, part }) in parts.into_iter().enumerate() {
-            let first = self.first(j);
+        for OfActuator { own, part } in parts {
             for (k, (i, product)) in own.into_iter().enumerate() {
-                for m in first..p {
-                    c[(m, i)] += part[(m - first, k)];
+                for m in 0..p {
+                    c[(m, i)] += part[(m, k)];
                 }
                 b[i] += product;
             }
         }
+        self.reduce(&mut c);
         for (i, b) in b.iter_mut().enumerate() {
             *b -= (0..p).map(|m| c[(m, i)] * self.d[m]).sum::<f64>();
         }

@@ -180,7 +180,7 @@ pub fn of_logs<'a>(
     let logs = logs.as_ref();
     let effects = catalogue::all();
     closeness::tighten(&mut data, &effects)?;
-    let first = Searched::of(&data, &effects, progress)?;
+    let first = Searched::of(&data, &effects, None, progress)?;
     let others = first.doubts(&effects).into_iter().map(|assumed| {
         let mut data = plain.clone().as_shown(assumed)?;
         closeness::tighten(&mut data, &effects)?;
@@ -191,7 +191,7 @@ pub fn of_logs<'a>(
     let mut found = first;
     for data in &others {
         let before = found.set_aside(&effects);
-        let other = Searched::of(data, &effects, progress)?;
+        let other = Searched::of(data, &effects, Some(&before), progress)?;
         found = match other.stands_for(&before, &effects) {
             true => other,
             false => before.taken_up(),

@@ -308,7 +308,51 @@ impl Finder<'_> {
     /// The best shapes of effects at places. Those that gain little beside the best one stay at a point of their grid.
     pub fn best_shapes(&self, tasks: &[Task]) -> Vec<Candidate> {
         let sketches = tasks.par_iter().with_max_len(1);
-        let sketches: Vec<Sketch> = sketches.filter_map(|t| self.sketch(*t)).collect();
+        self.candidates(sketches.filter_map(|t| self.sketch(*t)).collect())
+    }
+
+    /// The same of a search of the same records with something else assumed, from the shapes that were best `before`. Those that gain
+    /// much in either search are looked for in their whole grid.
+    fn best_shapes_from(&self, before: &[Candidate]) -> Vec<Candidate> {
+        let first = before.iter().fold(0.0f64, |m, c| m.max(c.gain));
+        let large = |c: &Candidate| c.gain > T.shapes.anew * first || c.ruled_out.is_some();
+        let start = |c: &Candidate| match large(c) {
+            true => self.sketch((c.effect, c.place)),
+            false => self.sketch_of(c),
+        };
+        let all = before.par_iter().with_max_len(1);
+        let mut sketches: Vec<Option<Sketch>> = all.map(start).collect();
+        let gains = sketches.iter().flatten().map(|s| s.gain);
+        let most = gains.fold(0.0f64, f64::max);
+        let own = sketches.par_iter_mut().zip(before).with_max_len(1);
+        own.for_each(|(sketch, c)| {
+            if !large(c)
+                && sketch
+                    .as_ref()
+                    .is_some_and(|s| s.gain > T.shapes.anew * most)
+            {
+                *sketch = self.sketch((c.effect, c.place));
+            }
+        });
+        self.candidates(sketches.into_iter().flatten().collect())
+    }
+
+    /// The shape of a candidate, as a sketch beside this set.
+    fn sketch_of(&self, c: &Candidate) -> Option<Sketch> {
+        let task = (c.effect, c.place);
+        let tried = self
+            .tried(task, std::slice::from_ref(&c.shape), true)?
+            .pop()?;
+        Some(Sketch {
+            task,
+            grid: self.effect(task).shapes(self.cx, &task.1),
+            shape: c.shape.clone(),
+            gain: tried.counts(),
+            said: None,
+        })
+    }
+
+    fn candidates(&self, sketches: Vec<Sketch>) -> Vec<Candidate> {
         let most = sketches.iter().fold(0.0f64, |m, s| m.max(s.gain));
         let all = sketches.into_par_iter().with_max_len(1);
         all.filter_map(|s| self.candidate(s, most)).collect()
@@ -336,20 +380,31 @@ fn candidate((effect, place): Task, tried: Tried, shape: Shape) -> Candidate {
     }
 }
 
-/// Every effect at every place with its best shape; by falling gain.
-pub fn singles(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Vec<Candidate> {
-    let tasks: Vec<Task> = effects
-        .iter()
-        .enumerate()
-        .flat_map(|(e, effect)| effect.sites(cx).into_iter().map(move |p| (e, p)))
-        .collect();
+/// Every effect at every place with its best shape, from those `before` where the records were searched already; by falling
+/// gain.
+pub fn singles(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: &[Box<dyn Effect>],
+    before: Option<&[Candidate]>,
+) -> Vec<Candidate> {
     let beside = &evidence.set(&[]);
     let finder = Finder {
         cx,
         effects,
         beside,
     };
-    let mut all = finder.best_shapes(&tasks);
+    let sites = |(e, effect): (usize, &Box<dyn Effect>)| {
+        let places = effect.sites(cx).into_iter();
+        places.map(move |p| (e, p)).collect::<Vec<Task>>()
+    };
+    let mut all = match before {
+        Some(before) => finder.best_shapes_from(before),
+        None => {
+            let tasks: Vec<Task> = effects.iter().enumerate().flat_map(sites).collect();
+            finder.best_shapes(&tasks)
+        }
+    };
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     all
 }

@@ -29,20 +29,21 @@ pub struct Searched<'a> {
 }
 
 impl<'a> Searched<'a> {
-    /// Searches records.
+    /// Searches records, from what a search `before` has found in them.
     ///
     /// # Errors
     /// Poses that cannot be reached.
     pub fn of(
         data: &'a Data<'a>,
         effects: &[Box<dyn Effect>],
+        before: Option<&Aside>,
         progress: &(dyn Fn(&str) + Sync),
     ) -> Result<Self> {
         let evidence = Evidence::new(data, 1.0);
         let phi = evidence.parameters(&[], &evidence.fit(&[]));
         let cx = Context::new(data, phi)?;
         progress("every effect at every place");
-        let list = singles(&evidence, &cx, effects);
+        let list = singles(&evidence, &cx, effects, before.map(|b| &b.list[..]));
         let (cx, mut list) = settled(data, &evidence, effects, cx, list)?;
         let decision = decide(&evidence, &cx, effects, &list, progress);
         // only their energies are asked for from here on

@@ -68,7 +68,7 @@ pub fn settled<'a>(
     let Some((next, _)) = best.filter(|b| b.1 > T.settle.least * most) else {
         return Ok((cx, list));
     };
-    let anew = singles(evidence, &next, effects);
+    let anew = singles(evidence, &next, effects, None);
     match anew.first().is_some_and(sways) {
         true => Ok((next, anew)),
         false => Ok((cx, list)),

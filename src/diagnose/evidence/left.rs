@@ -9,14 +9,7 @@ impl Evidence<'_> {
     /// Parameters of the nominal model that go with a fit of a set.
     pub fn parameters(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
         let p = self.d.len();
-        let u = self.reduced(set, fit);
-        // L^T x = u
-        let mut x = Mat::from_fn(p, 1, |i, _| u[i]);
-        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
-            self.l.transpose(),
-            x.as_mut(),
-            faer::Par::Seq,
-        );
+        let x = self.restored(&self.reduced(set, fit));
         (0..p)
             .map(|i| self.phi[i] + self.spread[i] * x[(i, 0)])
             .collect()
@@ -27,11 +20,7 @@ impl Evidence<'_> {
     pub fn freedoms(&self) -> f64 {
         let p = self.d.len();
         let mut inverse = Mat::<f64>::identity(p, p);
-        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-            self.l.as_ref(),
-            inverse.as_mut(),
-            faer::Par::Seq,
-        );
+        self.reduce(&mut inverse);
         p as f64 - inverse.squared_norm_l2()
     }
 
@@ -39,11 +28,7 @@ impl Evidence<'_> {
     pub fn std(&self, i: usize) -> f64 {
         let mut x = Mat::<f64>::zeros(self.d.len(), 1);
         x[(i, 0)] = self.spread[i];
-        faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-            self.l.as_ref(),
-            x.as_mut(),
-            faer::Par::Seq,
-        );
+        self.reduce(&mut x);
         x.col(0).norm_l2()
     }
 
@@ -63,11 +48,12 @@ impl Evidence<'_> {
 
     /// Whitened residual of all rows with a fitted set, by actuator.
     pub fn residual(&self, set: &[&Projected], fit: &Fit) -> Vec<Vec<f64>> {
-        let u = self.reduced(set, fit);
+        let x = self.restored(&self.reduced(set, fit));
         (0..self.data.joints())
             .into_par_iter()
             .map(|j| {
-                let y = &self.q[j] * faer::ColRef::from_slice(&u[self.first(j)..]);
+                let w = &self.w[j];
+                let y = &w.b * (&w.r * x.col(0));
                 let mut e: Vec<f64> = self.r[j]
                     .iter()
                     .enumerate()

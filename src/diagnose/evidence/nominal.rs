@@ -1,14 +1,15 @@
 //! The nominal model, whitened and decomposed under its prior.
 
-use super::Evidence;
 use super::algebra::dot;
+use super::{Basis, Evidence};
 use crate::diagnose::data::Data;
-use faer::reborrow::Reborrow;
-use faer::{Mat, Side};
+use faer::linalg::triangular_solve;
+use faer::{Mat, Par, Side};
 use rayon::prelude::*;
 
-/// Rows that are decomposed at a time.
-const ROWS: usize = 4096;
+/// What a column of the nominal model must add to others of an actuator in all its rows together, for one deviation of the prior.
+/// Unit: deviations of the noise.
+const ADDS: f64 = 1e-4;
 
 impl<'a> Evidence<'a> {
     /// With the prior of the data, its deviations multiplied by `loosen`.
@@ -24,25 +25,18 @@ impl<'a> Evidence<'a> {
             .iter()
             .map(|s| (s * loosen).max(floor))
             .collect();
-        // bodies before an actuator do not show in its torque: its columns begin behind theirs
-        let first: Vec<usize> = (0..n)
-            .map(|j| (0..p).find(|c| data.w[j].get(*c).is_some()).unwrap_or(p))
-            .collect();
-        let mut w: Vec<Mat<f64>> = (0..n)
-            .into_par_iter()
-            .map(|j| {
-                let mut out = Mat::zeros(data.rows(), p - first[j]);
-                for c in first[j]..p {
-                    let Some(from) = data.w[j].get(c) else {
-                        continue;
-                    };
-                    for (i, v) in data.modelled(j, from).into_iter().enumerate() {
-                        out[(i, c - first[j])] = v;
-                    }
+        // bodies before an actuator do not show in its torque, nor does friction of others: columns that are not zero
+        let shown = |j: usize| (0..p).filter_map(move |c| Some((c, data.w[j].get(c)?)));
+        let whitened = |j: usize| -> (Vec<usize>, Mat<f64>) {
+            let (at, from): (Vec<usize>, Vec<&[f64]>) = shown(j).unzip();
+            let mut w = Mat::zeros(data.rows(), at.len());
+            for (k, (c, from)) in at.iter().zip(from).enumerate() {
+                for (i, v) in data.modelled(j, from).into_iter().enumerate() {
+                    w[(i, k)] = spread[*c] * v;
                 }
-                out
-            })
-            .collect();
+            }
+            (at, w)
+        };
         let nominal = data.model_torque(&phi);
         let r: Vec<Vec<f64>> = (0..n)
             .into_par_iter()
@@ -53,19 +47,22 @@ impl<'a> Evidence<'a> {
                 data.whiten(j, &raw)
             })
             .collect();
-        let grams: Vec<Mat<f64>> = w
-            .par_iter()
-            .map(|w| {
+        // scaled by the prior, so that the matrix is 1 + something
+        let parts: Vec<(Vec<usize>, Mat<f64>, Basis)> = (0..n)
+            .into_par_iter()
+            .map(|j| {
+                let (at, w) = whitened(j);
                 let f = w.subrows(0, fitted);
-                f.transpose() * f
+                let gram = f.transpose() * f;
+                let basis = Basis::of(&at, &w, p);
+                (at, gram, basis)
             })
             .collect();
-        // scaled by the prior, so that the matrix is 1 + something
         let mut a = Mat::<f64>::identity(p, p);
-        for (g, first) in grams.iter().zip(&first) {
-            for i in *first..p {
-                for k in *first..p {
-                    a[(i, k)] += g[(i - first, k - first)] * spread[i] * spread[k];
+        for (at, gram, _) in &parts {
+            for (i, row) in at.iter().enumerate() {
+                for (k, column) in at.iter().enumerate() {
+                    a[(*row, *column)] += gram[(i, k)];
                 }
             }
         }
@@ -73,49 +70,56 @@ impl<'a> Evidence<'a> {
             Ok(f) => f.L().to_owned(),
             Err(_) => Mat::identity(p, p),
         };
-        // Q = W diag(spread) L⁻ᵀ: solve L Qᵀ = (W diag(spread))ᵀ, where Q begins with the same columns of zeros
-        w.par_iter_mut().zip(&first).for_each(|(w, first)| {
-            let more = p - first;
-            let l = l.submatrix(*first, *first, more, more);
-            for c in 0..more {
-                for i in 0..w.nrows() {
-                    w[(i, c)] *= spread[first + c];
-                }
-            }
-            // some rows at a time: a copy of all of them on every thread would be the most that a diagnosis holds
-            for from in (0..w.nrows()).step_by(ROWS) {
-                let rows = ROWS.min(w.nrows() - from);
-                let mut some = w.subrows_mut(from, rows);
-                let mut t = some.rb().transpose().to_owned();
-                faer::linalg::triangular_solve::solve_lower_triangular_in_place(
-                    l,
-                    t.as_mut(),
-                    faer::Par::Seq,
-                );
-                some.copy_from(t.transpose());
-            }
-        });
-        let q = w;
-        let mut d = vec![0.0; p];
+        let w: Vec<Basis> = parts.into_iter().map(|(_, _, basis)| basis).collect();
+        let mut pull = Mat::zeros(p, 1);
         let mut rr = 0.0;
-        for j in 0..n {
-            for (c, d) in d[first[j]..].iter_mut().enumerate() {
-                let column = q[j].col(c);
-                let column = column.try_as_col_major().expect("column major").as_slice();
-                *d += dot(&column[..fitted], &r[j][..fitted]);
-            }
-            rr += dot(&r[j][..fitted], &r[j][..fitted]);
+        for (w, r) in w.iter().zip(&r) {
+            let own = faer::ColRef::from_slice(&r[..fitted]);
+            pull += w.r.transpose() * (w.b.subrows(0, fitted).transpose() * own.as_mat());
+            rr += dot(&r[..fitted], &r[..fitted]);
         }
-        let j0 = rr - dot(&d, &d);
-        Evidence {
+        let mut out = Evidence {
             data,
             phi,
-            q,
+            w,
             l,
             r,
-            d,
-            j0,
+            d: Vec::new(),
+            j0: 0.0,
             spread,
+        };
+        out.reduce(&mut pull);
+        out.d = (0..p).map(|i| pull[(i, 0)]).collect();
+        out.j0 = rr - dot(&out.d, &out.d);
+        out
+    }
+}
+
+impl Basis {
+    /// Of columns `w` that belong `at` these of `count` parameters.
+    fn of(at: &[usize], w: &Mat<f64>, count: usize) -> Basis {
+        if at.is_empty() {
+            let (b, r) = (Mat::zeros(w.nrows(), 0), Mat::zeros(0, count));
+            return Basis { b, r };
         }
+        // pivots of the triangle are those of the columns
+        let pivoted = w.qr().thin_R().col_piv_qr();
+        let (triangle, order) = (pivoted.thin_R(), pivoted.P().arrays().0);
+        let all = triangle.nrows();
+        let rank = (0..all).find(|k| triangle[(*k, *k)].abs() < ADDS);
+        let rank = rank.unwrap_or(all);
+        // R₁₁ X = [R₁₁ R₁₂]
+        let mut shares = triangle.subrows(0, rank).to_owned();
+        triangular_solve::solve_upper_triangular_in_place(
+            triangle.submatrix(0, 0, rank, rank),
+            shares.as_mut(),
+            Par::Seq,
+        );
+        let mut r = Mat::zeros(rank, count);
+        for (k, from) in order.iter().enumerate() {
+            r.col_mut(at[*from]).copy_from(shares.col(k));
+        }
+        let b = Mat::from_fn(w.nrows(), rank, |i, k| w[(i, order[k])]);
+        Basis { b, r }
     }
 }

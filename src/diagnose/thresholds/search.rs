@@ -55,6 +55,9 @@ pub struct Shapes {
     pub refined: f64,
     /// Gain over that of the best candidate from which on a shape is refined. Unit: share. Source: by hand.
     pub near: f64,
+    /// Gain over that of the best candidate from which on a second search of the same records looks at a whole grid again. Unit: share.
+    /// Source: by hand.
+    pub anew: f64,
     /// Factors of the steps. Unit: ratio. Source: by hand.
     pub steps: [f64; 3],
     /// How far below the grid a shape may lie. Unit: ratio. Source: by hand.
@@ -68,6 +71,7 @@ pub struct Shapes {
 pub(super) const SHAPES: Shapes = Shapes {
     refined: 20.0,
     near: 0.3,
+    anew: 0.1,
     steps: [1.3, 1.12, 1.05],
     below: 1.5,
     above: 1.2,
