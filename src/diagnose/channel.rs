@@ -44,6 +44,8 @@ struct Channel {
     pub window: f64,
     /// time by which dry friction reverses before the velocity does, s
     pub lead: f64,
+    /// where they would have it, sure or not, s
+    next: f64,
     /// its deviation where what the model leaves counts as noise, s; infinite where it was not looked for
     pub deviation: f64,
     /// parameters of the refitted nominal model
@@ -63,13 +65,13 @@ impl Channel {
             true => 0.0,
             false => agreed(&e, &[], &curved).value,
         };
-        let (mut lead, mut deviation) = (data.lead, f64::INFINITY);
+        let (mut lead, mut next, mut deviation) = (data.lead, data.lead, f64::INFINITY);
         if leads {
             let step = T.reversals.step;
             let slope = e.project(&[data.slope(&model)]);
             let earlier = e.project(&by_joint(data.earlier(&phi, step)));
             let found = agreed(&e, &[&curved, &slope], &earlier);
-            let more = (lead + step * found.value).clamp(0.0, T.reversals.longest);
+            next = (lead + step * found.value).clamp(0.0, T.reversals.longest);
             deviation = step * found.deviation;
             // joints that disagree have widened what they agree on already
             let times = match earlier.z.len() {
@@ -77,13 +79,14 @@ impl Channel {
                 _ => T.reversals.agreed,
             };
             let sure = times * step * found.sure;
-            if more > T.reversals.shortest.max(sure) {
-                lead = more;
+            if next > T.reversals.shortest.max(sure) {
+                lead = next;
             }
         }
         Channel {
             window: window(data.window + found),
             lead,
+            next,
             deviation,
             phi,
         }
@@ -212,11 +215,13 @@ impl Data<'_> {
         for _ in 0..T.reversals.rounds {
             let Channel {
                 lead,
+                next,
                 deviation,
                 phi,
                 ..
             } = Channel::of(self, true);
             least = T.reversals.early.max(T.reversals.sure * deviation);
+            self.perhaps_early = next > T.reversals.shortest.max(T.reversals.perhaps * deviation);
             let done = (lead - self.lead).abs() < T.reversals.settled;
             self.reverse_early(lead, &phi)?;
             if done {
@@ -252,6 +257,16 @@ impl Data<'_> {
         }
         let better = usize::from(left[1] < left[0]);
         self.reverse_early(both[better], &nominal)
+    }
+
+    /// By how much torque may be ahead of the positions where nothing but dry friction reverses early, s: not all joints have the
+    /// same time, and where none was taken for found there may yet be that of a simulator's usual settings.
+    pub fn early_friction_within(&self) -> f64 {
+        match (self.lead > 0.0, self.perhaps_early) {
+            (true, _) => T.reversals.of_one * self.lead,
+            (false, true) => T.reversals.usual,
+            (false, false) => 0.0,
+        }
     }
 
     /// A modelled signal of all records as the torque channel would show it, whitened.

@@ -52,6 +52,8 @@ pub struct Data<'a> {
     /// time by which dry friction reverses before the velocity does, s: a simulator that regularises friction by a
     /// velocity and an acceleration, `sgn(q̇ + T q̈)`; 0 for a machine
     pub lead: f64,
+    /// whether a lead shows that the records are not sure of
+    pub perhaps_early: bool,
     /// largest speed of each actuator in the fitted records
     pub speed: Vec<f64>,
     /// lowest and highest position of each actuator in the fitted records
@@ -179,6 +181,7 @@ impl<'a> Data<'a> {
             records,
             window: 0.0,
             lead: 0.0,
+            perhaps_early: false,
             speed,
             range,
             tool: Vec::new(),

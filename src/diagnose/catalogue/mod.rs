@@ -151,6 +151,10 @@ pub trait Effect: Sync {
     fn late(&self) -> bool {
         false
     }
+    /// Time by which it has the torque ahead of the positions, s.
+    fn ahead(&self, _shape: &Shape, _eta: &[f64]) -> Option<f64> {
+        None
+    }
     /// Whether it may be believed where it explains a part of the gap on its joints only, and nothing else comes near that part.
     fn of_a_part(&self, _shape: &Shape) -> bool {
         true

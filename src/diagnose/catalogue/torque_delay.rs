@@ -42,6 +42,10 @@ impl Effect for TorqueDelay {
         true
     }
 
+    fn ahead(&self, shape: &Shape, eta: &[f64]) -> Option<f64> {
+        Some(-shape[0] * eta[0]).filter(|t| *t > 0.0)
+    }
+
     /// A torque that comes late leaves a gap that it explains. One ahead of the positions is close to what many effects leave in
     /// part: soft friction that reverses early, a wheel that runs out of true, an elastic gear.
     fn of_a_part(&self, shape: &Shape) -> bool {

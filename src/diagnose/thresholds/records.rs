@@ -174,6 +174,11 @@ pub struct Reversals {
     /// one takes a part of a gap that is not explained. Unit: s. Source: MuJoCo's
     /// default `solref`.
     pub usual: f64,
+    /// Deviations from which on such a time may be there, although it is not taken for found. Unit: count. Source: an arm in MuJoCo had 4.6.
+    pub perhaps: f64,
+    /// How far the torque of a joint may be ahead through its own friction, over that time. Unit: ratio. Source: arms in MuJoCo whose
+    /// joints were said to be ahead had 0.16 and 0.35.
+    pub of_one: f64,
     /// Part of the deceleration by dry friction alone by which a simulator's friction gives way, `(1 − d)/d`. Unit: share.
     /// Source: MuJoCo's default `solimp`, `d` = 0.9.
     pub soft: f64,
@@ -208,6 +213,8 @@ pub(super) const REVERSALS: Reversals = Reversals {
     longest: 0.03,
     early: 0.006,
     usual: 0.0095,
+    perhaps: 3.0,
+    of_one: 0.5,
     soft: 1.0 / 9.0,
     trusted: 0.5,
     settled: 5e-4,

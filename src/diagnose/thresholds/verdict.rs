@@ -110,6 +110,8 @@ pub struct Confidence {
     /// joint whose formula may miss it. Unit: ratio. Source: drag of the lowest exponent beside hysteresis had 0.03 and 0.10
     /// in MuJoCo, a delay of −1.3 ms beside a transmission error 0.08.
     pub beside: Gate,
+    /// Time by which torque is ahead of the positions, over what friction that reverses early may be. Unit: ratio. Source: by hand.
+    pub ahead: Gate,
     /// Share of the unlikeliness of the parameters that a hidden effect takes away. Unit: share. Source: by
     /// hand.
     pub parameters: Gate,
@@ -139,6 +141,7 @@ pub(super) const CONFIDENCE: Confidence = Confidence {
     alone: gate(0.35, 0.04),
     alone_share: gate(0.15, 0.02),
     beside: gate(0.25, 0.03),
+    ahead: gate(1.0, 0.06),
     parameters: gate(0.7, 0.05),
     holdout: gate(0.3, 0.07),
     repeats: gate(0.45, 0.07),

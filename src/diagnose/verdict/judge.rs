@@ -99,6 +99,7 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
         * decoys.map_or(1.0, |d| T.confidence.decoys.below(d))
         * explains_enough(m, rivals)
         * beside_larger(m)
+        * ahead_of_friction(m)
         * holds(m)
 }
 
@@ -135,6 +136,16 @@ fn beside_larger(m: &Beside) -> f64 {
     match largest > m.gain {
         true => T.confidence.beside.above(m.gain / largest),
         false => 1.0,
+    }
+}
+
+/// Whether torque that is ahead of the positions is farther ahead than dry friction that reverses early can have it.
+fn ahead_of_friction(m: &Beside) -> f64 {
+    let within = m.st.evidence.data.early_friction_within();
+    let effect = &m.st.effects[m.member.effect];
+    match effect.ahead(&m.member.shape, &m.member.eta) {
+        Some(time) if within > 0.0 => T.confidence.ahead.above(time / within),
+        _ => 1.0,
     }
 }
 
