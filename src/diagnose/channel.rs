@@ -367,13 +367,17 @@ impl Data<'_> {
     /// Residuals of all records where rows of a coarse encoder count as much as they tell: near reversals it does not say
     /// when a joint turned, and its filter spreads that.
     pub fn told(&self, mut residual: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-        for (j, row) in residual.iter_mut().enumerate() {
-            if self.filtered(j) {
-                let rows = row.iter_mut().zip(&self.weights[j]);
-                rows.for_each(|(v, w)| *v *= w);
-            }
-        }
+        let rows = residual.iter_mut().enumerate();
+        rows.for_each(|(j, row)| self.tell(j, row));
         residual
+    }
+
+    /// The same of one actuator.
+    pub fn tell(&self, j: usize, row: &mut [f64]) {
+        if self.filtered(j) {
+            let rows = row.iter_mut().zip(&self.weights[j]);
+            rows.for_each(|(v, w)| *v *= w);
+        }
     }
 }
 

@@ -104,7 +104,7 @@ fn members(
     let data = evidence.data;
     let members = decision.projected();
     let scatter = |set: &[&Projected]| -> Vec<Vec<f64>> {
-        evidence.unwhitened(&evidence.residual(set, &evidence.fit(set)))
+        evidence.as_counted(&evidence.residual(set, &evidence.fit(set)))
     };
     let (all, gap) = (scatter(&members), scatter(&[]));
     let mut findings = Vec::new();
@@ -112,7 +112,7 @@ fn members(
         let mut rest = members.clone();
         rest.remove(i);
         let total = match m.frozen {
-            true => &evidence.unwhitened(&evidence.r),
+            true => &evidence.as_counted(&evidence.r),
             false => &gap,
         };
         let without = scatter(&rest);

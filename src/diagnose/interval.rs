@@ -14,7 +14,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The 95 % interval of `explains` from residuals of the gap (`total`), of the fit without the effect
-/// and of the fit with it, by actuator in units of the noise. With fewer than eight blocks nothing
+/// and of the fit with it, by actuator as the gap is counted. With fewer than eight blocks nothing
 /// is known: `[0, 1]`.
 pub fn explained(
     data: &Data,
@@ -40,9 +40,12 @@ pub fn explained(
             };
             let gone = energy(without) - energy(with);
             let at = part.start - span.start..part.end - span.start;
-            let noise = data.noise.iter().zip(&counted).map(|(n, counted)| {
-                let sound = counted[at.clone()].iter().filter(|m| **m).count();
-                (1.0 + n.excess) * sound as f64
+            let noise = (0..data.joints()).map(|j| match data.counts_whitened(j) {
+                true => data.weights[j][part.clone()].iter().map(|w| w * w).sum(),
+                false => {
+                    let sound = counted[j][at.clone()].iter().filter(|m| **m).count();
+                    (1.0 + data.noise[j].excess) * sound as f64
+                }
             });
             let noise: f64 = noise.sum();
             blocks.push([gone, energy(total) - noise]);

@@ -210,7 +210,8 @@ pub fn of_logs<'a>(
     let fit = evidence.fit(&members);
     let phi_after = evidence.parameters(&members, &fit);
     let frozen = data.gap_that_counts(&data.model_torque(&evidence.phi));
-    let [refit, after] = [&[][..], &members].map(|set| evidence.torque_left(set));
+    let left = [&[][..], &members].map(|set| evidence.residual(set, &evidence.fit(set)));
+    let [refit, after] = left.each_ref().map(|e| evidence.in_torque(e));
     let mut findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
     let fitted = |r: &Series| r.fit;
     let residual_gap = gap::joints(data, &refit, fitted);
@@ -230,8 +231,8 @@ pub fn of_logs<'a>(
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
     let at_rest = at_rest::find(data, &units);
     warnings.extend(at_rest::warnings(&at_rest));
-    let left = too_much(&residual_gap, data);
-    let honest = match (decision.verdict, left) {
+    let much = too_much(&residual_gap, data);
+    let honest = match (decision.verdict, much) {
         (Verdict::NoGap, true) => Verdict::Unknown,
         (verdict, _) => verdict,
     };
@@ -273,12 +274,17 @@ pub fn of_logs<'a>(
             // tried on other periods, of which there are none
             false => None,
         },
-        records: result::record_gaps(data, &phi_after, [&frozen, &refit, &after]),
+        records: result::record_gaps(
+            &evidence,
+            &phi_after,
+            [&frozen, &refit, &after],
+            [&evidence.r, &left[0], &left[1]],
+        ),
         holdout: data.predicts().then_some(decision.holdout),
         moves: data.moves(),
         at_rest,
         second_encoder,
-        stands_out: decision.stands_out || left,
+        stands_out: decision.stands_out || much,
         unexplained: if data.moves() {
             decision.unexplained
         } else {

@@ -3,6 +3,7 @@
 use super::at_rest::AtRest;
 use super::catalogue::Effect;
 use super::data::Data;
+use super::evidence::Evidence;
 use super::finding::Finding;
 use super::forward::Forward;
 use super::gap::{self, JointGap, Shares};
@@ -112,10 +113,26 @@ impl Diagnosis {
     }
 }
 
-/// Energies of the gap record by record from residuals in N m or N: of the frozen model, refitted, and
-/// with the effects, which goes with the parameters `phi`.
-pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec<RecordGap> {
+/// Energies of the gap record by record from residuals in N m or N, and whitened: of the frozen model, refitted, and with the
+/// effects, which goes with the parameters `phi`.
+pub fn record_gaps(
+    evidence: &Evidence,
+    phi: &[f64],
+    residuals: [&[Vec<f64>]; 3],
+    whitened: [&[Vec<f64>]; 3],
+) -> Vec<RecordGap> {
+    let data = evidence.data;
     let all = residuals.map(|e| gap::scaled(data, e));
+    let above = |k: usize, r: &Series, j: usize, i: usize| {
+        let rows = r.counts(j).max(1) as f64;
+        match data.counts_whitened(j) {
+            true => evidence.beyond(j, &whitened[i][j], k) / rows,
+            false => {
+                let (a, b) = gap::excess(r, j, &all[i][j][data.span(k)]);
+                (a + b) / rows - data.noise[j].excess
+            }
+        }
+    };
     let remarks = |k: usize, r: &Series| {
         let load = data.free_load_in_words(k, phi);
         r.remarks.iter().cloned().chain(load).collect()
@@ -127,12 +144,7 @@ pub fn record_gaps(data: &Data, phi: &[f64], residuals: [&[Vec<f64>]; 3]) -> Vec
             name: r.name.clone(),
             fit: r.fit,
             joints: (0..data.joints())
-                .map(|j| {
-                    std::array::from_fn(|i| {
-                        let (a, b) = gap::excess(r, j, &all[i][j][data.span(k)]);
-                        ((a + b) / r.counts(j).max(1) as f64 - data.noise[j].excess).max(0.0)
-                    })
-                })
+                .map(|j| std::array::from_fn(|i| above(k, r, j, i).max(0.0)))
                 .collect(),
             repeats: r.cycle.is_some(),
             remarks: remarks(k, r),

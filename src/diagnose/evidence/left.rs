@@ -83,21 +83,32 @@ impl Evidence<'_> {
         self.data.told(self.data.silenced(before))
     }
 
-    /// Energy of a whitened residual of an actuator beyond that of its noise, on the fitted records or the others; whitening has taken what
-    /// its encoder makes unknown for noise.
-    pub fn beyond(&self, j: usize, e: &[f64], fitted: bool) -> f64 {
+    /// A whitened residual as the gap of each actuator is counted: as it is where that is on whitened rows, elsewhere as by
+    /// [`Evidence::unwhitened`].
+    pub fn as_counted(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let data = self.data;
-        let records = data.records.iter().enumerate();
-        let rows = records.filter(|(_, r)| r.fit == fitted);
-        rows.flat_map(|(k, _)| data.span(k))
-            .map(|i| e[i] * e[i] - data.weights[j][i] * data.weights[j][i])
-            .sum()
+        let own = |(j, e): (usize, &Vec<f64>)| match data.counts_whitened(j) {
+            true => e.clone(),
+            false => data.unwhiten(j, e),
+        };
+        let all = residual.par_iter().enumerate().map(own).collect();
+        let mut all = data.silenced(all);
+        let plain = (all.iter_mut().enumerate()).filter(|(j, _)| !data.counts_whitened(*j));
+        plain.for_each(|(j, row)| data.tell(j, row));
+        all
     }
 
-    /// What the nominal model leaves of the torque beside a fitted set, by actuator, N m or N; zero
-    /// where nothing was measured.
-    pub fn torque_left(&self, set: &[&Projected]) -> Vec<Vec<f64>> {
-        let mut all = self.unwhitened(&self.residual(set, &self.fit(set)));
+    /// Energy of a whitened residual of an actuator in record `k` beyond that of its noise; whitening has taken what its encoder makes
+    /// unknown for noise.
+    pub fn beyond(&self, j: usize, e: &[f64], k: usize) -> f64 {
+        let weights = &self.data.weights[j];
+        let rows = self.data.span(k);
+        rows.map(|i| e[i] * e[i] - weights[i] * weights[i]).sum()
+    }
+
+    /// A whitened residual of a torque, by actuator, N m or N; zero where nothing was measured.
+    pub fn in_torque(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let mut all = self.unwhitened(residual);
         for (row, noise) in all.iter_mut().zip(&self.data.noise) {
             row.iter_mut().for_each(|v| *v *= noise.std);
         }

@@ -93,10 +93,11 @@ impl State<'_> {
     /// what the encoder makes unknown, and the gap in units of the torque's noise is a small difference of large numbers: it is counted on whitened rows.
     pub fn gap(&self, residual: &[Vec<f64>], fitted: bool) -> Vec<f64> {
         let data = self.evidence.data;
-        let plain = self.evidence.unwhitened(residual);
-        let all = gap::energies(data, &plain, |r| r.fit == fitted);
+        let counted = self.evidence.as_counted(residual);
+        let all = gap::energies(data, &counted, |r| r.fit == fitted);
+        let records = || (0..data.records.len()).filter(|k| data.records[*k].fit == fitted);
         let of = |(j, [repeating, other]): (usize, [f64; 2])| match data.counts_whitened(j) {
-            true => self.evidence.beyond(j, &residual[j], fitted),
+            true => records().map(|k| self.evidence.beyond(j, &counted[j], k)).sum(),
             false => repeating + other,
         };
         all.into_iter().enumerate().map(of).collect()
