@@ -7,6 +7,7 @@
 //! 2012, ch. 4).
 
 use super::data::Data;
+use super::evidence::Evidence;
 use super::noise::{LINES, between_periods, spectrum};
 use super::thresholds::THRESHOLDS as T;
 use crate::signals::series::Series;
@@ -129,20 +130,25 @@ pub fn energies(
         .collect()
 }
 
-/// Gap of each actuator from a residual in N m.
+/// Gap of each actuator from a residual in N m or N, and whitened: where it is counted on whitened rows, the torque of the same energy over
+/// the noise.
 pub fn joints(
-    data: &Data,
+    evidence: &Evidence,
     residual: &[Vec<f64>],
+    whitened: &[Vec<f64>],
     pick: impl Fn(&Series) -> bool + Copy,
 ) -> Vec<JointGap> {
+    let data = evidence.data;
     let names = data.plant.actuators();
     let mut out: Vec<JointGap> = (0..data.joints())
         .map(|j| {
             let (mut sum, mut count, mut torque, mut filtered) = (0.0, 0.0, 0.0, 0.0);
+            let mut beyond = 0.0;
             for (k, r) in data.records.iter().enumerate().filter(|(_, r)| pick(r)) {
                 let e = &residual[j][data.span(k)];
                 sum += e.iter().map(|v| v * v).sum::<f64>();
                 count += r.counts(j) as f64;
+                beyond += evidence.beyond(j, &whitened[j], k);
                 // relative errors below about 20 Hz, torque and residual filtered alike
                 let w = ((T.measure.low_pass / r.dt).round() as usize).max(1);
                 let low = |x: &[f64]| -> f64 { triangle(x, w).iter().map(|v| v * v).sum() };
@@ -150,11 +156,14 @@ pub fn joints(
                 torque += low(&r.silenced(j, r.torque(j)));
             }
             let noise = data.noise[j].std;
+            let count = f64::max(count, 1.0);
+            let above = match data.counts_whitened(j) {
+                true => noise * noise * beyond / count,
+                false => sum / count - noise * noise * (1.0 + data.noise[j].excess),
+            };
             JointGap {
                 joint: names[j].name.clone(),
-                rms: (sum / f64::max(count, 1.0) - noise * noise * (1.0 + data.noise[j].excess))
-                    .max(0.0)
-                    .sqrt(),
+                rms: above.max(0.0).sqrt(),
                 noise,
                 share: 0.0,
                 relative: (filtered / torque.max(1e-300)).sqrt(),

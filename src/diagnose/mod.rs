@@ -214,7 +214,7 @@ pub fn of_logs<'a>(
     let [refit, after] = left.each_ref().map(|e| evidence.in_torque(e));
     let mut findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
     let fitted = |r: &Series| r.fit;
-    let residual_gap = gap::joints(data, &refit, fitted);
+    let residual_gap = gap::joints(&evidence, &refit, &left[0], fitted);
     progress("forward simulation");
     let all = decision.members.iter().map(|m| &m.candidate);
     let all = all.map(|c| (effects[c.effect].as_ref(), c.place, &c.shape, &c.eta[..]));
@@ -258,16 +258,16 @@ pub fn of_logs<'a>(
         progress("next experiment");
         next::propose(&evidence, &cx, &effects, &list, &findings, settings)
     });
-    let scaled = gap::scaled(data, &refit);
+    let scaled = evidence.as_counted(&left[0]);
     Ok(Diagnosis {
         robot: plant.name().to_string(),
         joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
         units,
         verdict,
         findings,
-        frozen: gap::joints(data, &frozen, fitted),
+        frozen: gap::joints(&evidence, &frozen, &evidence.r, fitted),
         refit: residual_gap,
-        explained: gap::joints(data, &after, fitted),
+        explained: gap::joints(&evidence, &after, &left[1], fitted),
         shares: gap::shares(data, &scaled),
         bound: match data.records.iter().any(|r| r.fit && r.cycle.is_some()) {
             true => gap::bound(data, &scaled),
@@ -291,7 +291,7 @@ pub fn of_logs<'a>(
             1.0
         },
         traces: traces::traces(data, &refit, &after),
-        noise_source: result::noise_source(data).into(),
+        noise_source: result::noise_source(data),
         untestable: result::untestable(data, &list, &effects),
         ruled_out: result::ruled_out(data, &list, &effects),
         phi: phi_after[..plant.parameters().len()].to_vec(),

@@ -87,11 +87,21 @@ impl Data<'_> {
         (share * self.torque_rms(j) / self.noise[j].std).powi(2)
     }
 
-    /// Factor on the gap per row that a sound model may leave on an actuator, in units of the torque's noise: more than 1 where its
-    /// encoder is coarse, for what repeats of its steps is no noise but no gap of the model either.
+    /// Factor on the gap per row that a sound model may leave on an actuator, as it is counted: more than 1 where its
+    /// encoder is coarse, for what repeats of its steps is no noise but no gap of the model either, and where friction reverses early, for a
+    /// simulator's shape of it about reversals is known in part.
     pub(super) fn allowance(&self, j: usize) -> f64 {
-        if !self.coarse(j) {
+        if self.counts_whitened(j) {
             return 1.0;
+        }
+        if !self.coarse(j) {
+            let dry = self.plant.actuators()[j].terms[2];
+            return match self.lead > 0.0 {
+                true => (T.reversals.shape * dry / self.noise[j].std)
+                    .powi(2)
+                    .max(1.0),
+                false => 1.0,
+            };
         }
         let steps = 1.0 + T.noise.of_steps * self.noise[j].excess;
         let most = self.share_of_torque(j, T.noise.most_of_steps);

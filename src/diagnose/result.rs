@@ -211,12 +211,19 @@ pub fn untestable(
 }
 
 /// Where the noise floor comes from, in words.
-pub fn noise_source(data: &Data) -> &'static str {
-    match data.noise[0].source {
+pub fn noise_source(data: &Data) -> String {
+    let from = match data.noise[0].source {
         Source::Periods => "the scatter between repeated periods",
         Source::HighBand => {
             "the residual above the band of the motion (no record repeats, so that noise below it is \
              assumed to be as high)"
         }
-    }
+    };
+    let whitened = match (0..data.joints()).any(|j| data.counts_whitened(j)) {
+        true => {
+            "; behind coarse encoders what they cannot resolve is taken off, too, frequency by frequency"
+        }
+        false => "",
+    };
+    format!("{from}{whitened}")
 }

@@ -176,6 +176,9 @@ pub struct Reversals {
     pub usual: f64,
     /// Deviations from which on such a time may be there, although it is not taken for found. Unit: count. Source: an arm in MuJoCo had 4.6.
     pub perhaps: f64,
+    /// Gap over dry friction that reverses early, as deviations, below which (times the root of `gap.sound`) its shape about reversals is
+    /// not known. Unit: share. Source: clean arms in MuJoCo left 0.04 at most.
+    pub shape: f64,
     /// How far the torque of a joint may be ahead through its own friction, over that time. Unit: ratio. Source: arms in MuJoCo whose
     /// joints were said to be ahead had 0.16 and 0.35.
     pub of_one: f64,
@@ -214,6 +217,7 @@ pub(super) const REVERSALS: Reversals = Reversals {
     early: 0.006,
     usual: 0.0095,
     perhaps: 3.0,
+    shape: 0.06,
     of_one: 0.5,
     soft: 1.0 / 9.0,
     trusted: 0.5,

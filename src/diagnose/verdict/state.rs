@@ -21,7 +21,7 @@ pub struct State<'a> {
     pub total: f64,
     /// what the prior expects its own penalty to be
     pub freedoms: f64,
-    /// factor on the gap per row that a sound model may leave, by actuator; 1 where it is counted on whitened rows
+    /// factor on the gap per row that a sound model may leave, by actuator
     allowance: Vec<f64>,
 }
 
@@ -33,10 +33,7 @@ impl<'a> State<'a> {
         effects: &'a [Box<dyn Effect>],
     ) -> Self {
         let data = evidence.data;
-        let allowance = (0..data.joints()).map(|j| match data.counts_whitened(j) {
-            true => 1.0,
-            false => data.allowance(j),
-        });
+        let allowance = (0..data.joints()).map(|j| data.allowance(j));
         let mut st = State {
             evidence,
             cx,
@@ -97,7 +94,9 @@ impl State<'_> {
         let all = gap::energies(data, &counted, |r| r.fit == fitted);
         let records = || (0..data.records.len()).filter(|k| data.records[*k].fit == fitted);
         let of = |(j, [repeating, other]): (usize, [f64; 2])| match data.counts_whitened(j) {
-            true => records().map(|k| self.evidence.beyond(j, &counted[j], k)).sum(),
+            true => records()
+                .map(|k| self.evidence.beyond(j, &counted[j], k))
+                .sum(),
             false => repeating + other,
         };
         all.into_iter().enumerate().map(of).collect()
