@@ -98,12 +98,17 @@ impl<'a> Evidence<'a> {
 impl Basis {
     /// Of columns `w` that belong `at` these of `count` parameters.
     fn of(at: &[usize], w: &Mat<f64>, count: usize) -> Basis {
-        if at.is_empty() {
+        let of = |triangle: Mat<f64>| {
+            // that of zeros alone has no pivots
+            (triangle.norm_max() >= ADDS).then(|| triangle.col_piv_qr())
+        };
+        // pivots of the triangle are those of the columns
+        let some = !at.is_empty();
+        let pivoted = some.then(|| w.qr().thin_R().to_owned()).and_then(of);
+        let Some(pivoted) = pivoted else {
             let (b, r) = (Mat::zeros(w.nrows(), 0), Mat::zeros(0, count));
             return Basis { b, r };
-        }
-        // pivots of the triangle are those of the columns
-        let pivoted = w.qr().thin_R().col_piv_qr();
+        };
         let (triangle, order) = (pivoted.thin_R(), pivoted.P().arrays().0);
         let all = triangle.nrows();
         let rank = (0..all).find(|k| triangle[(*k, *k)].abs() < ADDS);
@@ -121,5 +126,34 @@ impl Basis {
         }
         let b = Mat::from_fn(w.nrows(), rank, |i, k| w[(i, order[k])]);
         Basis { b, r }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns that depend on others, that are zero, or all of them, are made from those that are kept.
+    #[test]
+    fn kept_columns_make_all() {
+        let wave = |i: usize, f: f64| (f * i as f64).sin();
+        let columns = |i: usize, k: usize| match k {
+            0 => wave(i, 0.3),
+            1 => 0.0,
+            2 => 1e4 * wave(i, 0.5),
+            3 => wave(i, 0.3) - 2e3 * wave(i, 0.5),
+            _ => 5.0 * wave(i, 0.9) + wave(i, 0.3),
+        };
+        let w = Mat::from_fn(60, 5, columns);
+        let at = [1, 2, 4, 5, 7];
+        let basis = Basis::of(&at, &w, 9);
+        assert_eq!(basis.b.ncols(), 3);
+        let made = &basis.b * &basis.r;
+        let want = |i: usize, c: usize| at.iter().position(|a| *a == c).map_or(0.0, |k| w[(i, k)]);
+        let left = made - Mat::from_fn(60, 9, want);
+        assert!(left.norm_max() < 1e-8, "{}", left.norm_max());
+        let none = Basis::of(&[3, 4], &Mat::zeros(60, 2), 9);
+        assert_eq!((none.b.ncols(), none.r.shape()), (0, (0, 9)));
+        assert_eq!(Basis::of(&[], &Mat::zeros(60, 0), 9).b.ncols(), 0);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Diagnosis, unit, worst};
 use crate::diagnose::gap::JointGap;
+use crate::diagnose::thresholds::THRESHOLDS as T;
 use crate::report::format::{percent, significant};
 use crate::report::html::{figure, legend, table};
 use crate::report::plot::{Axis, Colour, Figure, Panel, Rule, Series, Shape};
@@ -72,6 +73,11 @@ pub(super) fn residuals(d: &Diagnosis) -> Markup {
                 " The records agree with this identified model so well that its links are allowed less: "
                 (percent(d.closeness[0])) " of that in mass, first moment and rotors, "
                 (percent(d.closeness[1])) " in tensors."
+            }
+            @if d.lead > 0.0 {
+                " Dry friction of this log reverses " (significant(1e3 * d.lead, 2)) " ms before the velocity does, as that of a \
+                 simulator. How it turns is known in part only: where nothing else is left, up to "
+                (percent(T.reversals.shape * T.gap.sound.sqrt())) " of it (rms) count as no gap."
             }
         }
     }
