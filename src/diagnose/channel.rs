@@ -179,7 +179,7 @@ impl Data<'_> {
     ///
     /// # Errors
     /// As [`Data::reverse_early`].
-    pub fn as_shown(mut self, assumed: Assumed) -> Result<Self> {
+    pub fn completed(mut self, assumed: Assumed) -> Result<Self> {
         let phi = self.values();
         self.reverse_early(assumed.lead.unwrap_or(0.0), &phi)?;
         let leads = assumed.lead.is_none() && self.find_lead()?;

@@ -99,7 +99,7 @@ use std::borrow::Cow;
 /// No record to fit to, records that are too short or hold too few sound samples, a payload that cannot be
 /// honoured, poses that cannot be reached.
 pub fn prepare<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<Data<'a>> {
-    gathered(plant, logs, Loads::One)?.as_shown(Assumed::default())
+    gathered(plant, logs, Loads::One)?.completed(Assumed::default())
 }
 
 /// Records before anything is said of what the log makes of a torque, with one unknown load, or one by record.
@@ -162,12 +162,12 @@ pub fn of_logs<'a>(
     progress("noise and nominal model");
     let mut logs = Cow::Borrowed(logs);
     let mut plain = gathered(plant, &logs, Loads::One)?;
-    let mut data = plain.clone().as_shown(Assumed::default())?;
+    let mut data = plain.clone().completed(Assumed::default())?;
     let mut carried = carried::find(&mut data)?;
     let mut with = |found: &carried::Carried, data: &mut Data<'a>| -> Result<()> {
         logs = Cow::Owned(found.stated(&logs));
         plain = gathered(plant, &logs, found.loads)?;
-        *data = plain.clone().as_shown(Assumed::default())?;
+        *data = plain.clone().completed(Assumed::default())?;
         Ok(())
     };
     if let Some(found) = &carried {
@@ -182,7 +182,7 @@ pub fn of_logs<'a>(
     closeness::tighten(&mut data, &effects)?;
     let first = Searched::of(&data, &effects, None, progress)?;
     let others = first.doubts(&effects).into_iter().map(|assumed| {
-        let mut data = plain.clone().as_shown(assumed)?;
+        let mut data = plain.clone().completed(assumed)?;
         closeness::tighten(&mut data, &effects)?;
         Ok(data)
     });

@@ -394,15 +394,12 @@ pub fn singles(
         effects,
         beside,
     };
-    let sites = |(e, effect): (usize, &Box<dyn Effect>)| {
-        let places = effect.sites(cx).into_iter();
-        places.map(move |p| (e, p)).collect::<Vec<Task>>()
-    };
     let mut all = match before {
         Some(before) => finder.best_shapes_from(before),
         None => {
-            let tasks: Vec<Task> = effects.iter().enumerate().flat_map(sites).collect();
-            finder.best_shapes(&tasks)
+            let tasks = (effects.iter().enumerate())
+                .flat_map(|(e, effect)| effect.sites(cx).into_iter().map(move |p| (e, p)));
+            finder.best_shapes(&tasks.collect::<Vec<Task>>())
         }
     };
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
