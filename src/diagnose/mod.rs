@@ -304,6 +304,7 @@ pub fn of_logs<'a>(
         closeness: data.closeness,
         window: data.window,
         lead: data.lead,
+        turns_in_part: (0..data.joints()).any(|j| data.turns_in_part(j)),
     })
 }
 

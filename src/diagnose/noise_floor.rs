@@ -96,7 +96,7 @@ impl Data<'_> {
         }
         if !self.coarse(j) {
             let dry = self.plant.actuators()[j].terms[2];
-            return match self.lead > 0.0 {
+            return match self.turns_in_part(j) {
                 true => (T.reversals.shape * dry / self.noise[j].std)
                     .powi(2)
                     .max(1.0),
@@ -108,6 +108,11 @@ impl Data<'_> {
         steps
             .min(most)
             .max(self.share_of_torque(j, T.noise.of_coarse).max(1.0))
+    }
+
+    /// Whether dry friction of an actuator reverses early and its encoder shows how, which is known in part only.
+    pub(super) fn turns_in_part(&self, j: usize) -> bool {
+        self.lead > 0.0 && !self.coarse(j)
     }
 
     /// Spectrum of the torque that unresolved acceleration makes.

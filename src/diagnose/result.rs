@@ -103,6 +103,8 @@ pub struct Diagnosis {
     pub window: f64,
     /// time by which the dry friction of the model reverses before the velocity does, s
     pub lead: f64,
+    /// whether a small share of such friction counts as no gap, for how it turns is known in part only
+    pub turns_in_part: bool,
 }
 
 impl Diagnosis {

@@ -74,10 +74,10 @@ pub(super) fn residuals(d: &Diagnosis) -> Markup {
                 (percent(d.closeness[0])) " of that in mass, first moment and rotors, "
                 (percent(d.closeness[1])) " in tensors."
             }
-            @if d.lead > 0.0 {
+            @if d.turns_in_part {
                 " Dry friction of this log reverses " (significant(1e3 * d.lead, 2)) " ms before the velocity does, as that of a \
-                 simulator. How it turns is known in part only: where nothing else is left, up to "
-                (percent(T.reversals.shape * T.gap.sound.sqrt())) " of it (rms) count as no gap."
+                 simulator. How it turns is known in part only: up to "
+                (percent(T.reversals.shape * T.gap.sound.sqrt())) " of the friction of a joint (rms) count as no gap there."
             }
         }
     }
