@@ -71,7 +71,12 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
     match d.verdict {
         Verdict::NoGap => (
             Tone::Good,
-            "No gap: what is left after ordinary corrections of the parameters is noise.".into(),
+            "No gap: what is left after ordinary corrections of the parameters is noise".to_string()
+                + if d.turns_in_part {
+                    ", or how the dry friction of a simulator turns."
+                } else {
+                    "."
+                },
         ),
         Verdict::Explained if sure => (
             Tone::Good,
