@@ -41,15 +41,15 @@ pub struct Assumed {
 /// What the records say of it.
 struct Channel {
     /// variance of the window beyond plus and minus one sample, samples squared
-    pub window: f64,
+    window: f64,
     /// time by which dry friction reverses before the velocity does, s
-    pub lead: f64,
+    lead: f64,
     /// where they would have it, sure or not, s
     next: f64,
     /// its deviation where what the model leaves counts as noise, s; infinite where it was not looked for
-    pub deviation: f64,
+    deviation: f64,
     /// parameters of the refitted nominal model
-    pub phi: Vec<f64>,
+    phi: Vec<f64>,
 }
 
 impl Channel {

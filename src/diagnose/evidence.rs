@@ -24,10 +24,9 @@ pub use draw::Draws;
 
 use super::column::Column;
 use super::data::Data;
-use algebra::{dot, overlap};
+use algebra::{dot, forwards, overlap};
 use faer::linalg::solvers::Solve;
-use faer::linalg::triangular_solve;
-use faer::{Mat, Par, Side};
+use faer::{Mat, Side};
 use rayon::prelude::*;
 
 /// Columns of an effect, whitened and reduced by the nominal model.
@@ -263,22 +262,6 @@ impl Evidence<'_> {
         [&self.l * &a.c, own, with]
     }
 
-    /// `L⁻¹` of the columns of a matrix.
-    fn reduce(&self, columns: &mut Mat<f64>) {
-        triangular_solve::solve_lower_triangular_in_place(
-            self.l.as_ref(),
-            columns.as_mut(),
-            Par::Seq,
-        );
-    }
-
-    /// `L⁻ᵀ` of a vector.
-    fn restored(&self, u: &[f64]) -> Mat<f64> {
-        let mut x = Mat::from_fn(u.len(), 1, |i, _| u[i]);
-        triangular_solve::solve_upper_triangular_in_place(self.l.transpose(), x.as_mut(), Par::Seq);
-        x
-    }
-
     /// Whitens and reduces columns.
     pub fn project(&self, columns: &[Column]) -> Projected {
         self.project_all(std::slice::from_ref(&columns.to_vec()))
@@ -332,7 +315,7 @@ impl Evidence<'_> {
                 b[i] += product;
             }
         }
-        self.reduce(&mut c);
+        forwards(&self.l, &mut c);
         for (i, b) in b.iter_mut().enumerate() {
             *b -= (0..p).map(|m| c[(m, i)] * self.d[m]).sum::<f64>();
         }

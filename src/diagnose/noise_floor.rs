@@ -91,17 +91,13 @@ impl Data<'_> {
     /// encoder is coarse, for what repeats of its steps is no noise but no gap of the model either, and where friction reverses early, for a
     /// simulator's shape of it about reversals is known in part.
     pub(super) fn allowance(&self, j: usize) -> f64 {
-        if self.counts_whitened(j) {
-            return 1.0;
-        }
-        if !self.coarse(j) {
+        if self.turns_in_part(j) {
             let dry = self.plant.actuators()[j].terms[2];
-            return match self.turns_in_part(j) {
-                true => (T.reversals.shape * dry / self.noise[j].std)
-                    .powi(2)
-                    .max(1.0),
-                false => 1.0,
-            };
+            let shape = T.reversals.shape * dry / self.noise[j].std;
+            return shape.powi(2).max(1.0);
+        }
+        if self.counts_whitened(j) || !self.coarse(j) {
+            return 1.0;
         }
         let steps = 1.0 + T.noise.of_steps * self.noise[j].excess;
         let most = self.share_of_torque(j, T.noise.most_of_steps);

@@ -3,7 +3,10 @@
 use super::Fit;
 use crate::diagnose::column::Column;
 use faer::linalg::solvers::Solve;
-use faer::{Mat, Side};
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
+use faer::{Mat, Par, Side};
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // four sums: the compiler may use wide registers without reordering one sum
@@ -29,6 +32,18 @@ pub(super) fn overlap(a: &Column, b: &Column, fitted: usize) -> f64 {
         .iter()
         .filter_map(|(j, x)| Some(dot(&x[..fitted], &b.get(*j)?[..fitted])))
         .sum()
+}
+
+/// `L⁻¹` of the columns of a matrix.
+pub(super) fn forwards(l: &Mat<f64>, columns: &mut Mat<f64>) {
+    solve_lower_triangular_in_place(l.as_ref(), columns.as_mut(), Par::Seq);
+}
+
+/// `L⁻ᵀ` of a vector.
+pub(super) fn backwards(l: &Mat<f64>, x: &[f64]) -> Mat<f64> {
+    let mut out = Mat::from_fn(x.len(), 1, |i, _| x[i]);
+    solve_upper_triangular_in_place(l.transpose(), out.as_mut(), Par::Seq);
+    out
 }
 
 /// `S η = b` with `S` positive semi-definite, scaled to a unit diagonal first.

@@ -1,5 +1,6 @@
 //! Draws from what the records and the prior leave open of parameters and coefficients together.
 
+use super::algebra::backwards;
 use super::{Evidence, Fit, Projected, assembled};
 use faer::{Mat, Side};
 
@@ -78,12 +79,7 @@ impl Evidence<'_> {
 impl Draws {
     /// Parameters and coefficients that go with standard normal numbers, one for each.
     pub fn at(&self, normal: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mut x = Mat::from_fn(self.mean.len(), 1, |i, _| normal[i]);
-        faer::linalg::triangular_solve::solve_upper_triangular_in_place(
-            self.l.transpose(),
-            x.as_mut(),
-            faer::Par::Seq,
-        );
+        let x = backwards(&self.l, &normal[..self.mean.len()]);
         let drawn = self.mean.iter().zip(&self.scale).enumerate();
         let mut all: Vec<f64> = drawn.map(|(i, (m, s))| m + s * x[(i, 0)]).collect();
         let eta = all.split_off(self.parameters);

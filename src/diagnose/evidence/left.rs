@@ -1,6 +1,6 @@
 //! What a fit leaves: parameters, residuals, energies.
 
-use super::algebra::dot;
+use super::algebra::{backwards, dot, forwards};
 use super::{Energy, Evidence, Fit, Projected};
 use faer::Mat;
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ impl Evidence<'_> {
     /// Parameters of the nominal model that go with a fit of a set.
     pub fn parameters(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {
         let p = self.d.len();
-        let x = self.restored(&self.reduced(set, fit));
+        let x = backwards(&self.l, &self.reduced(set, fit));
         (0..p)
             .map(|i| self.phi[i] + self.spread[i] * x[(i, 0)])
             .collect()
@@ -20,7 +20,7 @@ impl Evidence<'_> {
     pub fn freedoms(&self) -> f64 {
         let p = self.d.len();
         let mut inverse = Mat::<f64>::identity(p, p);
-        self.reduce(&mut inverse);
+        forwards(&self.l, &mut inverse);
         p as f64 - inverse.squared_norm_l2()
     }
 
@@ -28,7 +28,7 @@ impl Evidence<'_> {
     pub fn std(&self, i: usize) -> f64 {
         let mut x = Mat::<f64>::zeros(self.d.len(), 1);
         x[(i, 0)] = self.spread[i];
-        self.reduce(&mut x);
+        forwards(&self.l, &mut x);
         x.col(0).norm_l2()
     }
 
@@ -48,7 +48,7 @@ impl Evidence<'_> {
 
     /// Whitened residual of all rows with a fitted set, by actuator.
     pub fn residual(&self, set: &[&Projected], fit: &Fit) -> Vec<Vec<f64>> {
-        let x = self.restored(&self.reduced(set, fit));
+        let x = backwards(&self.l, &self.reduced(set, fit));
         (0..self.data.joints())
             .into_par_iter()
             .map(|j| {
@@ -78,23 +78,29 @@ impl Evidence<'_> {
     /// A whitened residual as it was before, in units of the noise of each actuator; zero where
     /// nothing was measured.
     pub fn unwhitened(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let before = residual.par_iter().enumerate();
-        let before = before.map(|(j, e)| self.data.unwhiten(j, e)).collect();
-        self.data.told(self.data.silenced(before))
+        self.unwhitened_but(residual, |_| false)
     }
 
     /// A whitened residual as the gap of each actuator is counted: as it is where that is on whitened rows, elsewhere as by
     /// [`Evidence::unwhitened`].
     pub fn as_counted(&self, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.unwhitened_but(residual, |j| self.data.counts_whitened(j))
+    }
+
+    fn unwhitened_but(
+        &self,
+        residual: &[Vec<f64>],
+        kept: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<Vec<f64>> {
         let data = self.data;
-        let own = |(j, e): (usize, &Vec<f64>)| match data.counts_whitened(j) {
+        let own = |(j, e): (usize, &Vec<f64>)| match kept(j) {
             true => e.clone(),
             false => data.unwhiten(j, e),
         };
         let all = residual.par_iter().enumerate().map(own).collect();
         let mut all = data.silenced(all);
-        let plain = (all.iter_mut().enumerate()).filter(|(j, _)| !data.counts_whitened(*j));
-        plain.for_each(|(j, row)| data.tell(j, row));
+        let before = all.iter_mut().enumerate().filter(|(j, _)| !kept(*j));
+        before.for_each(|(j, row)| data.tell(j, row));
         all
     }
 

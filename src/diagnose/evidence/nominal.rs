@@ -1,11 +1,14 @@
 //! The nominal model, whitened and decomposed under its prior.
 
-use super::algebra::dot;
+use super::algebra::{dot, forwards};
 use super::{Basis, Evidence};
 use crate::diagnose::data::Data;
 use faer::linalg::triangular_solve;
 use faer::{Mat, Par, Side};
 use rayon::prelude::*;
+
+/// Rows that are decomposed at a time.
+const ROWS: usize = 4096;
 
 /// What a column of the nominal model must add to others of an actuator in all its rows together, for one deviation of the prior.
 /// Unit: deviations of the noise.
@@ -78,37 +81,31 @@ impl<'a> Evidence<'a> {
             pull += w.r.transpose() * (w.b.subrows(0, fitted).transpose() * own.as_mat());
             rr += dot(&r[..fitted], &r[..fitted]);
         }
-        let mut out = Evidence {
+        forwards(&l, &mut pull);
+        let d: Vec<f64> = (0..p).map(|i| pull[(i, 0)]).collect();
+        Evidence {
             data,
             phi,
             w,
             l,
             r,
-            d: Vec::new(),
-            j0: 0.0,
+            j0: rr - dot(&d, &d),
+            d,
             spread,
-        };
-        out.reduce(&mut pull);
-        out.d = (0..p).map(|i| pull[(i, 0)]).collect();
-        out.j0 = rr - dot(&out.d, &out.d);
-        out
+        }
     }
 }
 
 impl Basis {
     /// Of columns `w` that belong `at` these of `count` parameters.
     fn of(at: &[usize], w: &Mat<f64>, count: usize) -> Basis {
-        let of = |triangle: Mat<f64>| {
-            // that of zeros alone has no pivots
-            (triangle.norm_max() >= ADDS).then(|| triangle.col_piv_qr())
-        };
-        // pivots of the triangle are those of the columns
-        let some = !at.is_empty();
-        let pivoted = some.then(|| w.qr().thin_R().to_owned()).and_then(of);
-        let Some(pivoted) = pivoted else {
+        // pivots of the triangle are those of the columns; that of zeros alone has none
+        let triangle = (!at.is_empty()).then(|| triangle(w));
+        let Some(triangle) = triangle.filter(|t| t.norm_max() >= ADDS) else {
             let (b, r) = (Mat::zeros(w.nrows(), 0), Mat::zeros(0, count));
             return Basis { b, r };
         };
+        let pivoted = triangle.col_piv_qr();
         let (triangle, order) = (pivoted.thin_R(), pivoted.P().arrays().0);
         let all = triangle.nrows();
         let rank = (0..all).find(|k| triangle[(*k, *k)].abs() < ADDS);
@@ -129,6 +126,23 @@ impl Basis {
     }
 }
 
+/// `R` of the decomposition `w = Q R`. Some rows at a time: a copy of all of them on every thread would be the most that a diagnosis
+/// holds.
+fn triangle(w: &Mat<f64>) -> Mat<f64> {
+    let columns = w.ncols();
+    let mut r = Mat::zeros(0, columns);
+    for from in (0..w.nrows()).step_by(ROWS) {
+        let rows = ROWS.min(w.nrows() - from);
+        let above = r.nrows();
+        let mut both = Mat::zeros(above + rows, columns);
+        both.submatrix_mut(0, 0, above, columns).copy_from(&r);
+        let mut below = both.submatrix_mut(above, 0, rows, columns);
+        below.copy_from(w.subrows(from, rows));
+        r = both.qr().thin_R().to_owned();
+    }
+    r
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -144,14 +158,17 @@ mod tests {
             3 => wave(i, 0.3) - 2e3 * wave(i, 0.5),
             _ => 5.0 * wave(i, 0.9) + wave(i, 0.3),
         };
-        let w = Mat::from_fn(60, 5, columns);
         let at = [1, 2, 4, 5, 7];
-        let basis = Basis::of(&at, &w, 9);
-        assert_eq!(basis.b.ncols(), 3);
-        let made = &basis.b * &basis.r;
-        let want = |i: usize, c: usize| at.iter().position(|a| *a == c).map_or(0.0, |k| w[(i, k)]);
-        let left = made - Mat::from_fn(60, 9, want);
-        assert!(left.norm_max() < 1e-8, "{}", left.norm_max());
+        for rows in [60, ROWS + 60] {
+            let w = Mat::from_fn(rows, 5, columns);
+            let basis = Basis::of(&at, &w, 9);
+            assert_eq!(basis.b.ncols(), 3);
+            let made = &basis.b * &basis.r;
+            let want =
+                |i: usize, c: usize| at.iter().position(|a| *a == c).map_or(0.0, |k| w[(i, k)]);
+            let left = made - Mat::from_fn(rows, 9, want);
+            assert!(left.norm_max() < 1e-8, "{}", left.norm_max());
+        }
         let none = Basis::of(&[3, 4], &Mat::zeros(60, 2), 9);
         assert_eq!((none.b.ncols(), none.r.shape()), (0, (0, 9)));
         assert_eq!(Basis::of(&[], &Mat::zeros(60, 0), 9).b.ncols(), 0);
