@@ -8,6 +8,7 @@
 //! alike, so that all tests count independent samples (Pintelon & Schoukens 2012, ch. 9).
 
 use super::thresholds::THRESHOLDS as T;
+use crate::signals::fourier::Plan;
 use crate::signals::repeats::{freedoms, means};
 use crate::signals::series::Series;
 use std::f64::consts::PI;
@@ -29,9 +30,7 @@ pub fn spectrum(x: &[f64]) -> Vec<f64> {
     let window: Vec<f64> = (0..n)
         .map(|i| (PI * (i as f64 + 0.5) / n as f64).sin())
         .collect();
-    let turn: Vec<(f64, f64)> = (0..n)
-        .map(|i| (2.0 * PI * i as f64 / n as f64).sin_cos())
-        .collect();
+    let plan = Plan::new(n);
     let segments = (x.len() - n) / (n / 2) + 1;
     for s in 0..segments {
         let piece: Vec<f64> = x[s * n / 2..][..n]
@@ -39,14 +38,8 @@ pub fn spectrum(x: &[f64]) -> Vec<f64> {
             .zip(&window)
             .map(|(a, w)| a * w)
             .collect();
-        for (l, out) in out.iter_mut().enumerate() {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (i, v) in piece.iter().enumerate() {
-                let (sin, cos) = turn[i * l % n];
-                re += v * cos;
-                im += v * sin;
-            }
-            *out += 2.0 * (re * re + im * im) / (n * segments) as f64;
+        for (out, line) in out.iter_mut().zip(plan.spectrum(piece)) {
+            *out += 2.0 * line.norm_sqr() / (n * segments) as f64;
         }
     }
     out

@@ -96,3 +96,10 @@ pub fn from_fine(values: &[f64], count: usize, out: &mut Vec<f64>) {
         out.push(sum / (FINE * FINE) as f64);
     }
 }
+
+/// What [`from_fine`] gives, by itself.
+pub fn sampled(values: &[f64], count: usize) -> Vec<f64> {
+    let mut out = Vec::with_capacity(count);
+    from_fine(values, count, &mut out);
+    out
+}

@@ -69,18 +69,25 @@ fn words(name: &str) -> Vec<String> {
 fn quantity(word: &str) -> Option<Quantity> {
     Some(match word {
         "q" | "qs" | "pos" | "posn" | "position" | "positions" | "angle" | "angles" | "qpos"
-        | "qm" | "jpos" | "encoder" | "enc" => Quantity::Position,
+        | "qm" | "jpos" | "encoder" | "enc" | "winkel" | "lage" | "istposition" | "istwinkel"
+        | "lageistwert" => Quantity::Position,
         "dq" | "qd" | "qdot" | "vel" | "velocity" | "velocities" | "speed" | "speeds" | "qvel"
-        | "omega" => Quantity::Velocity,
+        | "omega" | "geschwindigkeit" | "drehzahl" | "istgeschwindigkeit" | "istdrehzahl" => {
+            Quantity::Velocity
+        }
         "ddq" | "qdd" | "qddot" | "acc" | "accel" | "acceleration" | "accelerations" | "qacc" => {
             Quantity::Acceleration
         }
         "tau" | "torque" | "torques" | "effort" | "efforts" | "moment" | "trq" | "force"
-        | "eff" => Quantity::Torque,
-        "current" | "currents" | "curr" | "cur" | "amps" => Quantity::Current,
+        | "eff" | "drehmoment" | "istmoment" | "istdrehmoment" => Quantity::Torque,
+        "current" | "currents" | "curr" | "cur" | "amps" | "strom" | "motorstrom" | "iststrom" => {
+            Quantity::Current
+        }
         "dtau" | "taudot" => Quantity::Other,
         "ql" | "qlink" => Quantity::Link,
-        "qref" | "qdes" | "qcmd" => Quantity::Command,
+        "qref" | "qdes" | "qcmd" | "sollposition" | "sollwinkel" | "lagesollwert" => {
+            Quantity::Command
+        }
         _ => return None,
     })
 }
@@ -100,6 +107,8 @@ fn commands(word: &str) -> bool {
             | "setpoint"
             | "goal"
             | "control"
+            | "soll"
+            | "sollwert"
     )
 }
 
@@ -161,6 +170,10 @@ fn idle(word: &str) -> bool {
             | "axis"
             | "actuator"
             | "actuators"
+            | "achse"
+            | "gelenk"
+            | "ist"
+            | "istwert"
             | "motor"
             | "motors"
             | "state"
@@ -229,6 +242,9 @@ fn time(name: &str) -> Option<Option<&'static str>> {
                 | "duration"
                 | "date"
                 | "datetime"
+                | "zeit"
+                | "zeitstempel"
+                | "uhrzeit"
         )
     };
     let beside = |w: &str| {
@@ -537,6 +553,12 @@ mod tests {
             ),
             ("field.velocity3", Format::Csv, Velocity, Some(3)),
             ("Joint 4 angle [deg]", Format::Csv, Position, Some(4)),
+            ("Achse 4 Ist [Grad]", Format::Csv, Position, Some(4)),
+            ("Istposition_A4", Format::Csv, Position, Some(4)),
+            ("Sollposition_A4", Format::Csv, Command, Some(4)),
+            ("Achse4_Winkel_Soll", Format::Csv, Command, Some(4)),
+            ("Drehmoment Achse 4 [Nm]", Format::Csv, Torque, Some(4)),
+            ("Motorstrom Achse 4 [A]", Format::Csv, Current, Some(4)),
         ] {
             assert_eq!(says(name, format), Some((quantity, number)), "{name}");
         }

@@ -36,13 +36,15 @@ const UNITS: [(&str, f64); 26] = [
 pub(crate) fn unit(text: &str) -> Option<(&'static str, f64)> {
     let same = |a: &str| match a.trim() {
         "radian" | "radians" => "rad",
-        "degree" | "degrees" | "°" => "deg",
+        "degree" | "degrees" | "°" | "Grad" => "deg",
         "µs" | "usec" => "us",
         "msec" => "ms",
         "nsec" => "ns",
         "sec" | "seconds" => "s",
         "N·m" | "N*m" | "nm" | "NM" => "N m",
         "ma" => "mA",
+        "1/min" | "U/min" => "rpm",
+        "°/s" | "Grad/s" => "deg/s",
         "a" | "amp" | "amps" => "A",
         "count" | "ticks" => "counts",
         _ => "",

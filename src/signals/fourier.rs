@@ -3,7 +3,44 @@
 use realfft::num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::f64::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Plans of the lengths that were asked for last: to make one takes several times as long as to use it.
+struct Lately<T: ?Sized>(Mutex<Vec<(usize, Arc<T>)>>);
+
+/// So many are kept, of signals no longer than that.
+const KEPT: (usize, usize) = (8, 1 << 18);
+
+impl<T: ?Sized> Lately<T> {
+    const fn new() -> Self {
+        Lately(Mutex::new(Vec::new()))
+    }
+
+    /// The plan of a length, made where it is not among them.
+    fn plan(&self, count: usize, make: fn(usize) -> Arc<T>) -> Arc<T> {
+        let mine = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = |kept: &[(usize, Arc<T>)]| kept.iter().position(|k| k.0 == count);
+        let mut kept = mine();
+        if let Some(at) = found(&kept) {
+            let last = kept.remove(at);
+            kept.push(last.clone());
+            return last.1;
+        }
+        drop(kept);
+        let made = make(count);
+        let mut kept = mine();
+        if count <= KEPT.1 && found(&kept).is_none() {
+            if kept.len() == KEPT.0 {
+                kept.remove(0);
+            }
+            kept.push((count, made.clone()));
+        }
+        made
+    }
+}
+
+static FORWARD: Lately<dyn RealToComplex<f64>> = Lately::new();
+static BACK: Lately<dyn ComplexToReal<f64>> = Lately::new();
 
 /// What transforms of signals of one length share. `None` for a signal without samples.
 pub struct Plan(Option<Arc<dyn RealToComplex<f64>>>);
@@ -11,7 +48,8 @@ pub struct Plan(Option<Arc<dyn RealToComplex<f64>>>);
 impl Plan {
     /// For signals of `count` samples, any number; O(N log N).
     pub fn new(count: usize) -> Plan {
-        Plan((count > 0).then(|| RealFftPlanner::new().plan_fft_forward(count)))
+        let make = |count| RealFftPlanner::new().plan_fft_forward(count);
+        Plan((count > 0).then(|| FORWARD.plan(count, make)))
     }
 
     /// `X_k = Σ x_n e^{−2πi kn/N}` for `k = 0 … ⌊N/2⌋`; those above are the conjugates of these. The signal is used up.
@@ -61,7 +99,8 @@ pub struct Inverse(Option<Arc<dyn ComplexToReal<f64>>>);
 impl Inverse {
     /// For signals of `count` samples, any number; O(N log N).
     pub fn new(count: usize) -> Inverse {
-        Inverse((count > 0).then(|| RealFftPlanner::new().plan_fft_inverse(count)))
+        let make = |count| RealFftPlanner::new().plan_fft_inverse(count);
+        Inverse((count > 0).then(|| BACK.plan(count, make)))
     }
 
     /// The signal with this spectrum, times the number of its samples. The spectrum is used up.
@@ -84,18 +123,34 @@ impl Inverse {
 ///
 /// Exact for a signal that has no other harmonics, whatever its length.
 pub fn derivatives(x: &[f64], period: f64, highest: usize) -> [Vec<f64>; 3] {
+    derived(x, 2.0 * PI / period, highest, [0, 1, 2])
+}
+
+/// A signal of one period without the harmonics above `highest`.
+pub fn low_passed(x: &[f64], highest: usize) -> Vec<f64> {
+    let [one] = derived(x, 1.0, highest, [0]);
+    one
+}
+
+/// Derivatives of these orders of a signal of one period, low-passed; `omega` is the rate of its first harmonic, rad/s.
+fn derived<const N: usize>(
+    x: &[f64],
+    omega: f64,
+    highest: usize,
+    orders: [u32; N],
+) -> [Vec<f64>; N] {
     let n = x.len();
     let mean = x.iter().sum::<f64>() / n.max(1) as f64;
     let full = spectrum(&x.iter().map(|v| v - mean).collect::<Vec<_>>());
     let kept = n.div_ceil(2).min(highest.saturating_add(1));
     let back = Inverse::new(n);
-    std::array::from_fn(|d| {
+    orders.map(|order| {
         let mut y = vec![Complex64::ZERO; full.len()];
         for k in 1..kept {
-            let rate = Complex64::new(0.0, 2.0 * PI / period * k as f64);
-            y[k] = full[k] * rate.powu(d as u32) / n as f64;
+            let rate = Complex64::new(0.0, omega * k as f64);
+            y[k] = full[k] * rate.powu(order) / n as f64;
         }
-        if d == 0 && n > 0 {
+        if order == 0 && n > 0 {
             y[0] = mean.into();
         }
         back.signal(y)

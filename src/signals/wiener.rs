@@ -7,7 +7,7 @@
 //! filter. Otherwise the positions pass a zero-phase low-pass and central differences.
 
 use super::cutoff::Spectra;
-use super::fourier::{Inverse, Plan, derivatives};
+use super::fourier::{Inverse, Plan, low_passed};
 use super::repeats::scatter;
 use crate::dynamics::Samples;
 use std::f64::consts::PI;
@@ -133,8 +133,7 @@ pub fn likewise(x: &[f64], cycle: Option<usize>, dt: f64) -> Vec<f64> {
     let Some(cycle) = cycle else {
         return low_pass(x, half_width(dt));
     };
-    let period = cycle as f64 * dt;
-    let [one, ..] = derivatives(&mean_period(x, cycle), period, lines(cycle, dt));
+    let one = low_passed(&mean_period(x, cycle), lines(cycle, dt));
     one.iter().copied().cycle().take(x.len()).collect()
 }
 
@@ -325,23 +324,36 @@ fn difference(x: &[f64], dt: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Triangular moving average of half-width `w` samples.
+/// Triangular moving average of half-width `w` samples: two running sums of `w` samples, with zeros outside of the signal, over
+/// what the triangle has within it.
 pub fn triangle(x: &[f64], w: usize) -> Vec<f64> {
-    let n = x.len() as isize;
-    let w = w as isize;
+    let n = x.len();
+    // sums over `i + 1 − w ..= i` for every `i` that a triangle about a sample needs
+    let mut sum = 0.0;
+    let sums: Vec<f64> = (0..n + w - 1)
+        .map(|i| {
+            sum += x.get(i).copied().unwrap_or(0.0);
+            if i >= w {
+                sum -= x[i - w];
+            }
+            sum
+        })
+        .collect();
+    let mut total: f64 = sums[..w - 1].iter().sum();
     (0..n)
         .map(|i| {
-            let (mut sum, mut weight) = (0.0, 0.0);
-            for k in 1 - w..w {
-                if (0..n).contains(&(i + k)) {
-                    let f = (w - k.abs()) as f64;
-                    sum += f * x[(i + k) as usize];
-                    weight += f;
-                }
-            }
-            sum / weight
+            total += sums[i + w - 1];
+            let mean = total / weight(i.min(w - 1), (n - 1 - i).min(w - 1), w);
+            total -= sums[i];
+            mean
         })
         .collect()
+}
+
+/// Sum of the weights of a triangle of half-width `w` with so many samples before its middle, and so many after it.
+fn weight(before: usize, after: usize, w: usize) -> f64 {
+    let side = |k: usize| k * w - k * (k + 1) / 2;
+    (w + side(before) + side(after)) as f64
 }
 
 #[cfg(test)]
@@ -366,6 +378,20 @@ mod tests {
                     (with / own - left).abs() < 1e-9,
                     "{half} {frequency}: {left}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_triangle_is_the_weighted_mean_of_what_it_meets() {
+        let x: Vec<f64> = (0..60).map(|i| ((i * i) as f64 * 0.37).sin()).collect();
+        for (n, w) in [(1, 1), (1, 4), (5, 9), (60, 1), (60, 7), (60, 22)] {
+            let mean = triangle(&x[..n], w);
+            for (i, mean) in mean.iter().enumerate() {
+                let of = |k: usize| (w as f64 - i.abs_diff(k) as f64).max(0.0);
+                let all: f64 = (0..n).map(of).sum();
+                let sum: f64 = (0..n).map(|k| of(k) * x[k]).sum();
+                assert!((mean - sum / all).abs() < 1e-13, "{n} {w} {i}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Torque that repeats with the turn of the motor.
 
 use super::*;
-use crate::diagnose::window::fine;
+use crate::diagnose::window::{FINE, fine_values, sampled};
 use crate::signals::wiener::likewise;
 
 /// Cogging (torque ripple).
@@ -40,16 +40,21 @@ impl Effect for Cogging {
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let (j, k) = (place.first(), shape[0]);
-        let column = |f: &dyn Fn(f64) -> f64| {
-            // what no controller makes up for moves the motor: it shows where the motor's acceleration is known
-            let all = cx.data.each(|r, _| {
-                let ((q, v), mut out) = (r.state(j), Vec::with_capacity(r.count));
-                fine(q, v, r.acceleration(j), r.dt, |q, _| f(k * q), &mut out);
-                likewise(&out, r.cycle, r.dt)
+        let [mut sines, mut cosines] = [0, 1].map(|_| Vec::with_capacity(cx.data.rows()));
+        for r in &cx.data.records {
+            let ((q, v), a) = (r.state(j), r.acceleration(j));
+            let mut cosine = Vec::with_capacity(r.count * FINE);
+            let sine = fine_values(q, v, a, r.dt, |q, _, _| {
+                let (sin, cos) = (k * q).sin_cos();
+                cosine.push(cos);
+                sin
             });
-            Column::on(j, all)
-        };
-        vec![column(&f64::sin), column(&f64::cos)]
+            // what no controller makes up for moves the motor: it shows where the motor's acceleration is known
+            for (all, fine) in [(&mut sines, sine), (&mut cosines, cosine)] {
+                all.extend(likewise(&sampled(&fine, r.count), r.cycle, r.dt));
+            }
+        }
+        vec![Column::on(j, sines), Column::on(j, cosines)]
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {

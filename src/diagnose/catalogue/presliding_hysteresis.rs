@@ -1,6 +1,7 @@
 //! Friction that builds up over the displacement since the last reversal.
 
 use super::*;
+use crate::diagnose::window::{fine_values, sampled, sign};
 
 /// Springs of the form with many strengths.
 const ELEMENTS: usize = 8;
@@ -92,12 +93,8 @@ impl Effect for PreslidingHysteresis {
             for q in &q[..settle] {
                 z.step(*q);
             }
-            let values = crate::diagnose::window::fine_values(q, v, a, r.dt, |q, v, _| {
-                z.step(q) - crate::diagnose::window::sign(v, width)
-            });
-            let mut out = Vec::with_capacity(r.count);
-            crate::diagnose::window::from_fine(&values, r.count, &mut out);
-            out
+            let values = fine_values(q, v, a, r.dt, |q, v, _| z.step(q) - sign(v, width));
+            sampled(&values, r.count)
         });
         vec![Column::on(j, values)]
     }

@@ -1,6 +1,7 @@
 //! Friction that rises towards standstill.
 
 use super::*;
+use crate::diagnose::window::sign;
 
 /// Stribeck friction.
 pub struct StribeckFriction;
@@ -45,9 +46,9 @@ impl Effect for StribeckFriction {
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let width = 1e-3 * cx.data.speed[j];
-        let rise = |v: f64| {
-            crate::diagnose::window::sign(v, width) * (-(v.abs() / shape[0]).powf(shape[1])).exp()
-        };
+        // one or two: a general power takes several times as long
+        let power = shape[1] as i32;
+        let rise = |v: f64| sign(v, width) * (-(v.abs() / shape[0]).powi(power)).exp();
         vec![Column::on(j, cx.data.added(j, |_, v| rise(v)))]
     }
 

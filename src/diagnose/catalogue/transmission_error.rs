@@ -2,7 +2,7 @@
 
 use super::spring::Springs;
 use super::*;
-use crate::diagnose::window::{FINE, fine_values, from_fine};
+use crate::diagnose::window::{FINE, fine_values, sampled};
 use crate::signals::wiener::likewise;
 
 /// Transmission error.
@@ -171,7 +171,7 @@ fn shaken(r: &Series, j: usize, k: f64) -> [Vec<f64>; 2] {
         cosine.push(-a / k * sin - v * v * cos);
         a / k * cos - v * v * sin
     });
-    [averaged(&sine, r), averaged(&cosine, r)]
+    [sampled(&sine, r.count), sampled(&cosine, r.count)]
 }
 
 /// `1/k²` times the accelerations of a link on a spring that `e = sin kq` and `e = cos kq` move the end of:
@@ -201,12 +201,5 @@ fn swung(r: &Series, j: usize, [k, frequency]: [f64; 2]) -> [Vec<f64>; 2] {
         fine_values(&q[..cycle], &v[..cycle], &a[..cycle], r.dt, &mut step).len()
     });
     let sine = fine_values(q, v, a, r.dt, &mut step);
-    [averaged(&sine, r), averaged(&cosine[before..], r)]
-}
-
-/// Values on the sub-steps of a record as torque is averaged.
-fn averaged(values: &[f64], r: &Series) -> Vec<f64> {
-    let mut out = Vec::with_capacity(r.count);
-    from_fine(values, r.count, &mut out);
-    out
+    [sampled(&sine, r.count), sampled(&cosine[before..], r.count)]
 }

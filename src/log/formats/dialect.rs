@@ -143,36 +143,76 @@ pub(crate) fn stamp(cell: &[u8]) -> Option<f64> {
         (_, Some(text)) => (text, Some(12.0)),
         _ => (text, None),
     };
-    let (date, time) = match text.split_once(['T', ' ']) {
-        Some((d, t)) => (Some(d), t.trim()),
+    let bytes = text.as_bytes();
+    // a T of a month is none between date and time
+    let between = |i: &usize| {
+        bytes[*i] == b' ' || bytes[*i] == b'T' && *i > 0 && bytes[i - 1].is_ascii_digit()
+    };
+    let (date, time) = match (0..bytes.len()).find(between) {
+        Some(at) => (text.get(..at), text.get(at + 1..)?.trim()),
         None => (None, text),
     };
     let days = match date {
         None => 0.0,
-        Some(d) => {
-            let mut parts = d.split(['-', '/']).map(|p| p.parse::<i64>().ok());
-            let (y, m, d) = (parts.next()??, parts.next()??, parts.next()??);
-            if !(1..=12).contains(&m) || !(1..=31).contains(&d) || !(1900..3000).contains(&y) {
-                return None;
-            }
-            // days of the civil calendar since 1970 (proleptic Gregorian)
-            let (y, m) = if m > 2 { (y, m - 3) } else { (y - 1, m + 9) };
-            (365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + d - 1 - 719_468) as f64
-        }
+        Some(d) => day(d)?,
     };
     // the zone is the same throughout a log
     let time = time.trim_end_matches('Z').trim();
     let time = time.split(['+', '-']).next()?;
-    let mut parts = time.split(':');
-    let (h, m): (f64, f64) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
+    let parts: Vec<&str> = time.trim().split(':').collect();
+    let (h, m): (f64, f64) = (parts[0].parse().ok()?, parts.get(1)?.parse().ok()?);
     let h = noon.map_or(h, |noon| h % 12.0 + noon);
-    let s: f64 = parts
-        .next()
-        .map_or(Ok(0.0), |s| s.replace(',', ".").parse())
-        .ok()?;
-    (parts.next().is_none() && h < 48.0 && m < 60.0 && s < 61.0)
-        .then_some(days * 86400.0 + h * 3600.0 + m * 60.0 + s)
+    // where commas do not separate cells, a blank stands for one
+    let seconds = |s: &str| s.replace([',', ' '], ".").parse::<f64>().ok();
+    let s = match parts[2..] {
+        [] => 0.0,
+        [s] => seconds(s)?,
+        // milliseconds behind another colon
+        [s, ms] if ms.len() == 3 => {
+            s.parse::<u8>().ok()? as f64 + 1e-3 * f64::from(ms.parse::<u16>().ok()?)
+        }
+        _ => return None,
+    };
+    (h < 48.0 && m < 60.0 && s < 61.0).then_some(days * 86400.0 + h * 3600.0 + m * 60.0 + s)
 }
+
+/// Days of a date since 1970: year, month and day as ISO 8601 has them, day, month and year with points or hyphens between them and
+/// the month in figures or by its English name, month, day and year with slashes.
+fn day(date: &str) -> Option<f64> {
+    let parts: Vec<&str> = date.split(['-', '/', '.']).collect();
+    let [a, b, c] = parts[..] else { return None };
+    let (y, m, d) = match (a.len() == 4, date.contains('/')) {
+        (true, _) => (a, b, c),
+        // a day above 12 cannot be a month
+        (_, true) if a.parse::<u8>().is_ok_and(|a| a <= 12) => (c, a, b),
+        _ => (c, b, a),
+    };
+    let month = match m.parse::<i64>() {
+        Ok(m) => m,
+        Err(_) => {
+            let begins = |name: &&str| {
+                m.len() >= 3 && m.get(..3).is_some_and(|m| m.eq_ignore_ascii_case(name))
+            };
+            MONTHS.iter().position(begins)? as i64 + 1
+        }
+    };
+    let (y, d) = (y.parse::<i64>().ok()?, d.parse::<i64>().ok()?);
+    if !(1..=12).contains(&month) || !(1..=31).contains(&d) || !(1900..3000).contains(&y) {
+        return None;
+    }
+    // days of the civil calendar (proleptic Gregorian)
+    let (y, m) = if month > 2 {
+        (y, month - 3)
+    } else {
+        (y - 1, month + 9)
+    };
+    Some((365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + d - 1 - 719_468) as f64)
+}
+
+/// English names of months, three letters of each.
+const MONTHS: [&str; 12] = [
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+];
 
 impl Dialect {
     /// The dialect of a file that begins with `text`; `None` where it has no line of numbers.
@@ -541,4 +581,49 @@ fn unique(names: Vec<String>) -> Vec<String> {
 /// A text without the mark of its byte order.
 pub(super) fn strip(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_of_many_programs_are_one_time() {
+        let of = |text: &str| stamp(text.as_bytes());
+        let one = of("2026-01-05T08:00:30.010Z").unwrap();
+        assert_eq!(one, 20_458.0 * 86_400.0 + 8.0 * 3600.0 + 30.01);
+        for text in [
+            "2026-01-05 08:00:30,010",
+            "2026-01-05 08:00:30 010",
+            "2026/01/05 08:00:30.010",
+            "05.01.2026 08:00:30.010",
+            "5-Jan-2026 08:00:30.010",
+            "05-OCT-2026 08:00:30.010",
+            "01/05/2026 08:00:30.010",
+            "1/5/2026 8:00:30.010 AM",
+            "2026-01-05T08:00:30:010",
+            "2026-01-05T08:00:30.010+01:00",
+        ] {
+            let months = if text.contains("OCT") { 273.0 } else { 0.0 };
+            let found = of(text).unwrap_or_else(|| panic!("{text}"));
+            assert!((found - one - months * 86_400.0).abs() < 1e-6, "{text}");
+        }
+        // a day above 12 cannot be a month
+        assert_eq!(of("25/12/2026 1:00:00"), of("12/25/2026 01:00:00"));
+        assert_eq!(of("08:00:30:010"), Some(28_830.010));
+        for text in [
+            "",
+            "8",
+            "1.2.3",
+            "1.2.3 4:5",
+            "32.01.2026 08:00:00",
+            "5-Foo-2026 08:00:00",
+            "a:b",
+            "T",
+            " ",
+            "8:00:00:1",
+        ] {
+            assert_eq!(of(text), None, "{text}");
+        }
+    }
 }
