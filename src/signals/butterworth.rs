@@ -279,12 +279,8 @@ pub fn second_derivative(x: &[f64], h: f64) -> Vec<f64> {
 /// [`first_derivative`] into a signal of the same length.
 pub(super) fn first_derivative_into(x: &[f64], h: f64, out: &mut [f64]) {
     const C: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
-    let inner = |x: &[f64; 7]| {
-        (1..=3)
-            .map(|k| C[k - 1] * (x[3 + k] - x[3 - k]))
-            .sum::<f64>()
-            / h
-    };
+    let inner =
+        |[a, b, c, _, e, f, g]: [f64; 7]| (C[0] * (e - c) + C[1] * (f - b) + C[2] * (g - a)) / h;
     stencil(x, inner, 1, h, out);
 }
 
@@ -292,23 +288,15 @@ pub(super) fn first_derivative_into(x: &[f64], h: f64, out: &mut [f64]) {
 pub(super) fn second_derivative_into(x: &[f64], h: f64, out: &mut [f64]) {
     const C: [f64; 3] = [1.5, -3.0 / 20.0, 1.0 / 90.0];
     // differences first, so that a large constant does not cost digits
-    let inner = |x: &[f64; 7]| {
-        (1..=3)
-            .map(|k| C[k - 1] * ((x[3 + k] - x[3]) - (x[3] - x[3 - k])))
-            .sum::<f64>()
-            / (h * h)
+    let bend = |before: f64, here: f64, after: f64| (after - here) - (here - before);
+    let inner = |[a, b, c, d, e, f, g]: [f64; 7]| {
+        (C[0] * bend(c, d, e) + C[1] * bend(b, d, f) + C[2] * bend(a, d, g)) / (h * h)
     };
     stencil(x, inner, 2, h, out);
 }
 
 /// A stencil of three neighbours on each side; near the ends the parabola through three samples.
-fn stencil(
-    x: &[f64],
-    inner: impl Fn(&[f64; 7]) -> f64,
-    derivative: usize,
-    h: f64,
-    out: &mut [f64],
-) {
+fn stencil(x: &[f64], inner: impl Fn([f64; 7]) -> f64, derivative: usize, h: f64, out: &mut [f64]) {
     let n = x.len();
     let end = |i: usize| {
         if n < 3 {
@@ -329,9 +317,11 @@ fn stencil(
     }
     if n > 6 {
         // seven signals of one length, so that neighbours are computed side by side
-        let shifted: [&[f64]; 7] = std::array::from_fn(|k| &x[k..k + n - 6]);
-        for (i, y) in out[3..n - 3].iter_mut().enumerate() {
-            *y = inner(&shifted.map(|x| x[i]));
+        let out = &mut out[3..n - 3];
+        let shifted = |k: usize| &x[k..k + out.len()];
+        let [a, b, c, d, e, f, g] = [0, 1, 2, 3, 4, 5, 6].map(shifted);
+        for (i, y) in out.iter_mut().enumerate() {
+            *y = inner([a[i], b[i], c[i], d[i], e[i], f[i], g[i]]);
         }
     }
 }
