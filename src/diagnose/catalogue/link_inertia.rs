@@ -27,6 +27,10 @@ impl Effect for LinkInertia {
         true
     }
 
+    fn moments(&self) -> usize {
+        4
+    }
+
     fn robots(&self) -> Robots {
         Robots::Open
     }

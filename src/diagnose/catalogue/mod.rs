@@ -138,6 +138,10 @@ pub trait Effect: Sync {
     fn hides(&self) -> bool {
         false
     }
+    /// Of a body, how many of its coefficients are mass and first moments, before those of its tensor; of others 0.
+    fn moments(&self) -> usize {
+        0
+    }
     /// Information a priori on every coefficient, where these are in units of their deviations: 1; 0 where nothing is
     /// known of them.
     fn prior(&self) -> f64 {

@@ -28,6 +28,10 @@ impl Effect for Payload {
         true
     }
 
+    fn moments(&self) -> usize {
+        4
+    }
+
     fn places(&self, cx: &Context) -> Vec<Place> {
         let plant = cx.data.plant;
         let place = |body| plant.driver(body).map_or(Place::Robot, Place::Actuator);

@@ -4,7 +4,8 @@ use super::super::evidence::{Fit, Projected};
 use super::super::gap;
 use super::super::search::Candidate;
 use super::super::thresholds::THRESHOLDS as T;
-use super::state::{State, energy, others};
+use super::state::{State, energy, inflation, others};
+use std::ops::Range;
 
 /// What the judgement of a member rests on.
 pub struct Beside<'a> {
@@ -14,6 +15,8 @@ pub struct Beside<'a> {
     pub set: &'a [Candidate],
     /// the member
     pub member: &'a Candidate,
+    /// its coefficients among those of the whole set
+    pub own: Range<usize>,
     /// the others
     pub rest: Vec<Candidate>,
     /// fit of the whole set
@@ -51,6 +54,7 @@ impl<'a> Beside<'a> {
     ) -> Self {
         let member = &set[i];
         let rest = others(set, i);
+        let first = set[..i].iter().map(|c| c.eta.len()).sum();
         let (f0, r0) = st.fit(&rest);
         let (with, r1) = st.fit(set);
         let without = st.gap(&r0, true);
@@ -65,6 +69,7 @@ impl<'a> Beside<'a> {
             st,
             set,
             member,
+            own: first..first + member.eta.len(),
             rest,
             with,
             surprise_without,
@@ -86,6 +91,16 @@ impl<'a> Beside<'a> {
             && out.fall > T.hidden.surprise
             && (faint || out.gain_in_rows() < little || lives_there);
         out
+    }
+
+    /// Its coefficients over their deviations, where what the set leaves counts as noise.
+    pub fn deviations(&self) -> Vec<f64> {
+        let scale = inflation(&self.residual[1], self.st.evidence.data.fitted);
+        let std = |k: usize| self.with.covariance[k][k].max(1e-300).sqrt() * scale;
+        self.own
+            .clone()
+            .map(|k| self.with.eta[k] / std(k))
+            .collect()
     }
 
     /// Columns of the others.

@@ -100,6 +100,7 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
         * explains_enough(m, rivals)
         * beside_larger(m)
         * ahead_of_friction(m)
+        * known_by_itself(m)
         * holds(m)
 }
 
@@ -147,6 +148,21 @@ fn ahead_of_friction(m: &Beside) -> f64 {
         Some(time) if within > 0.0 => T.confidence.ahead.above(time / within),
         _ => 1.0,
     }
+}
+
+/// Whether a body that shows in the parameters alone has a mass or first moments that are known, or a tensor that stands out
+/// still more. What the formula of another effect misses moves parameters that only together are known, and ten of any link can
+/// follow them.
+fn known_by_itself(m: &Beside) -> f64 {
+    let moments = m.st.effects[m.member.effect].moments();
+    if !m.frozen || moments == 0 {
+        return 1.0;
+    }
+    let all = m.deviations();
+    let largest = |all: &[f64]| all.iter().fold(0.0f64, |m, t| m.max(t.abs()));
+    let (first, tensor) = all.split_at(all.len().min(moments));
+    let known = largest(first).max(largest(tensor) / T.confidence.tensor);
+    T.confidence.body.above(known)
 }
 
 /// Whether it does so on holdout records.
