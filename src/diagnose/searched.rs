@@ -124,13 +124,25 @@ impl<'a> Searched<'a> {
         members.filter(|m| m.together >= T.confidence.claim)
     }
 
-    /// `χ²` with them: what else was tried and not claimed takes a little, too.
+    /// What is left with them: what else was tried and not claimed takes a little, too. Every joint counts by the logarithm of the
+    /// power that is left there, in its own unit and not in that of its noise: where more is assumed wrongly, more counts as
+    /// noise. What the prior says against the parameters comes on top.
     fn left(&self) -> f64 {
         let members: Vec<&Projected> = self.claimed().map(|m| &m.candidate.projected).collect();
-        self.evidence.j0 - self.evidence.fit(&members).gain
+        let fit = self.evidence.fit(&members);
+        let residual = self.evidence.residual(&members, &fit);
+        let (mut all, mut unlikely) = (0.0, self.evidence.j0 - fit.gain);
+        for (e, noise) in residual.iter().zip(&self.evidence.data.noise) {
+            let e = &e[..self.evidence.data.fitted];
+            let power: f64 = e.iter().map(|v| v * v).sum();
+            unlikely -= power;
+            let unit = noise.filter[0].powi(2);
+            all += e.len() as f64 * (power / unit).max(f64::MIN_POSITIVE).ln();
+        }
+        all + unlikely
     }
 
-    /// By how much another `χ²` may be higher and count as no worse: deviations squared of what the set leaves.
+    /// By how much another may leave more and count as no worse: deviations squared of what the set leaves.
     fn margin(&self) -> f64 {
         let members = self.decision.projected();
         let residual = (self.evidence).residual(&members, &self.evidence.fit(&members));
@@ -147,9 +159,9 @@ pub struct Aside<'a> {
     decision: Decision,
     /// effects that it claims and early friction may pass for
     late: usize,
-    /// `χ²` with what it claims
+    /// what is left with what it claims
     left: f64,
-    /// by how much another `χ²` may be higher and count as no worse
+    /// by how much another may leave more and count as no worse
     margin: f64,
 }
 

@@ -70,19 +70,18 @@ fn quantity(word: &str) -> Option<Quantity> {
     Some(match word {
         "q" | "qs" | "pos" | "posn" | "position" | "positions" | "angle" | "angles" | "qpos"
         | "qm" | "jpos" | "encoder" | "enc" | "winkel" | "lage" | "istposition" | "istwinkel"
-        | "lageistwert" => Quantity::Position,
+        | "lageistwert" | "posicion" | "posizione" | "位置" | "角度" => Quantity::Position,
         "dq" | "qd" | "qdot" | "vel" | "velocity" | "velocities" | "speed" | "speeds" | "qvel"
-        | "omega" | "geschwindigkeit" | "drehzahl" | "istgeschwindigkeit" | "istdrehzahl" => {
-            Quantity::Velocity
-        }
+        | "omega" | "geschwindigkeit" | "drehzahl" | "istgeschwindigkeit" | "istdrehzahl"
+        | "vitesse" | "velocidad" | "velocita" | "速度" => Quantity::Velocity,
         "ddq" | "qdd" | "qddot" | "acc" | "accel" | "acceleration" | "accelerations" | "qacc" => {
             Quantity::Acceleration
         }
         "tau" | "torque" | "torques" | "effort" | "efforts" | "moment" | "trq" | "force"
-        | "eff" | "drehmoment" | "istmoment" | "istdrehmoment" => Quantity::Torque,
-        "current" | "currents" | "curr" | "cur" | "amps" | "strom" | "motorstrom" | "iststrom" => {
-            Quantity::Current
-        }
+        | "eff" | "drehmoment" | "istmoment" | "istdrehmoment" | "couple" | "coppia" | "力矩"
+        | "扭矩" | "トルク" => Quantity::Torque,
+        "current" | "currents" | "curr" | "cur" | "amps" | "strom" | "motorstrom" | "iststrom"
+        | "iq" | "courant" | "corriente" | "corrente" | "电流" | "電流" => Quantity::Current,
         "dtau" | "taudot" => Quantity::Other,
         "ql" | "qlink" => Quantity::Link,
         "qref" | "qdes" | "qcmd" | "sollposition" | "sollwinkel" | "lagesollwert" => {
@@ -147,7 +146,16 @@ fn elsewhere(word: &str) -> bool {
 fn foreign(word: &str) -> bool {
     let other = matches!(
         word,
-        "ext" | "external" | "error" | "err" | "std" | "hat" | "dtau" | "theta" | "dtheta"
+        "ext"
+            | "external"
+            | "disturbance"
+            | "error"
+            | "err"
+            | "std"
+            | "hat"
+            | "dtau"
+            | "theta"
+            | "dtheta"
     );
     other || elsewhere(word)
 }
@@ -172,6 +180,14 @@ fn idle(word: &str) -> bool {
             | "actuators"
             | "achse"
             | "gelenk"
+            | "axe"
+            | "articulation"
+            | "articulacion"
+            | "eje"
+            | "asse"
+            | "giunto"
+            | "关节"
+            | "軸"
             | "ist"
             | "istwert"
             | "motor"
@@ -245,6 +261,11 @@ fn time(name: &str) -> Option<Option<&'static str>> {
                 | "zeit"
                 | "zeitstempel"
                 | "uhrzeit"
+                | "temps"
+                | "tiempo"
+                | "tempo"
+                | "时间"
+                | "時間"
         )
     };
     let beside = |w: &str| {
@@ -284,6 +305,14 @@ fn time(name: &str) -> Option<Option<&'static str>> {
 /// `position0`, or the list `name` beside the list `position`, columns with the same number are of those joints.
 pub(crate) fn all(names: &[String], labels: &[[String; 2]], format: Format) -> Vec<Option<Named>> {
     let mut out: Vec<Option<Named>> = names.iter().map(|n| named(n, format)).collect();
+    let says = |n: &Option<Named>| n.as_ref().is_some_and(|n| n.quantity == Quantity::Position);
+    // beside other positions they are those of motors
+    if format != Format::Libfranka && !out.iter().any(says) {
+        let angles = names.iter().map(|n| angle(n));
+        out.iter_mut()
+            .zip(angles)
+            .for_each(|(named, angle)| *named = named.take().or(angle));
+    }
     // what is left of a name, so that those of one message are told from others
     let rest = |name: &str, what: fn(&str) -> bool| -> Vec<String> {
         let all = words(name).into_iter();
@@ -306,6 +335,25 @@ pub(crate) fn all(names: &[String], labels: &[[String; 2]], format: Format) -> V
         }
     }
     out
+}
+
+/// What a name says in which an angle is called theta.
+fn angle(name: &str) -> Option<Named> {
+    let words = words(name);
+    let theta = |w: &String| match w.as_str() {
+        "theta" | "thetas" | "θ" => Some(Quantity::Position),
+        "dtheta" | "thetadot" | "thetad" => Some(Quantity::Velocity),
+        "ddtheta" | "thetaddot" | "thetadd" => Some(Quantity::Acceleration),
+        _ => None,
+    };
+    let quantity = words.iter().find_map(theta)?;
+    let plain = |w: &String| theta(w).is_some() || idle(w) || w.parse::<usize>().is_ok();
+    words.iter().all(plain).then(|| Named {
+        quantity,
+        joint: None,
+        number: number(&words),
+        unit: unit_of(name, quantity, Format::Csv),
+    })
 }
 
 /// The last number of a name.
@@ -570,6 +618,24 @@ mod tests {
         );
         assert_eq!(named("time_ms", Format::Csv).unwrap().unit, Some("ms"));
         assert_eq!(named("%time", Format::Csv).unwrap().quantity, Time);
+    }
+
+    #[test]
+    fn theta_is_a_position_where_no_other_is() {
+        let quantities = |names: &[&str], format| -> Vec<Option<Quantity>> {
+            let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
+            let all = all(&names, &[], format);
+            all.into_iter().map(|n| n.map(|n| n.quantity)).collect()
+        };
+        let [position, velocity] = [Quantity::Position, Quantity::Velocity].map(Some);
+        let torque = Some(Quantity::Torque);
+        let alone = ["theta1", "thetadot1", "dtheta_1", "tau1"];
+        let found = quantities(&alone, Format::Csv);
+        assert_eq!(found, [position, velocity, velocity, torque]);
+        let beside = quantities(&["q1", "theta1", "tau1"], Format::Csv);
+        assert_eq!(beside, [position, None, torque]);
+        let franka = quantities(&["state.theta[0]"], Format::Libfranka);
+        assert_eq!(franka, [None]);
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub(crate) fn unit(text: &str) -> Option<(&'static str, f64)> {
         "msec" => "ms",
         "nsec" => "ns",
         "sec" | "seconds" => "s",
-        "N·m" | "N*m" | "nm" | "NM" => "N m",
+        "N·m" | "N*m" | "N-m" | "N.m" | "nm" | "NM" => "N m",
         "ma" => "mA",
         "1/min" | "U/min" => "rpm",
         "°/s" | "Grad/s" => "deg/s",

@@ -217,9 +217,21 @@ fn what_early_friction_of_mujoco_leaves_is_neither_a_delay_nor_a_gap() {
     let Some(python) = python::with("mujoco, numpy") else {
         return;
     };
-    named(&python, "15", "23");
     for (seed, arm) in [("14", "18"), ("15", "0")] {
         let said = an_arm(&python, seed, arm, tempfile::tempdir().unwrap().path());
         assert!(said.contains(": no_gap; \n"), "{said}");
+    }
+}
+
+/// What a search leaves that takes friction not to reverse early counts as noise of its encoders, too: its residual was the smaller
+/// one in units of that noise, and joints that were ahead by what the other search knows had names.
+#[test]
+fn a_search_of_mujocos_log_does_not_win_by_the_noise_it_makes() {
+    let Some(python) = python::with("mujoco, numpy") else {
+        return;
+    };
+    for (seed, arm) in [("17", "14"), ("15", "23")] {
+        let said = an_arm(&python, seed, arm, tempfile::tempdir().unwrap().path());
+        assert!(said.contains(": unknown; \n"), "{said}");
     }
 }

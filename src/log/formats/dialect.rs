@@ -177,7 +177,7 @@ pub(crate) fn stamp(cell: &[u8]) -> Option<f64> {
 }
 
 /// Days of a date since 1970: year, month and day as ISO 8601 has them, day, month and year with points or hyphens between them and
-/// the month in figures or by its English name, month, day and year with slashes.
+/// the month in figures or by its English name, month, day and year with slashes. A year of two digits is one of this century.
 fn day(date: &str) -> Option<f64> {
     let parts: Vec<&str> = date.split(['-', '/', '.']).collect();
     let [a, b, c] = parts[..] else { return None };
@@ -196,7 +196,9 @@ fn day(date: &str) -> Option<f64> {
             MONTHS.iter().position(begins)? as i64 + 1
         }
     };
+    let century = if y.len() == 2 { 2000 } else { 0 };
     let (y, d) = (y.parse::<i64>().ok()?, d.parse::<i64>().ok()?);
+    let y = y.saturating_add(century);
     if !(1..=12).contains(&month) || !(1..=31).contains(&d) || !(1900..3000).contains(&y) {
         return None;
     }
@@ -597,6 +599,7 @@ mod tests {
             "2026-01-05 08:00:30 010",
             "2026/01/05 08:00:30.010",
             "05.01.2026 08:00:30.010",
+            "05.01.26 08:00:30,010",
             "5-Jan-2026 08:00:30.010",
             "05-OCT-2026 08:00:30.010",
             "01/05/2026 08:00:30.010",
