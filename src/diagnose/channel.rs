@@ -249,11 +249,7 @@ impl Data<'_> {
             self.reverse_early(lead, &nominal)?;
             let e = Evidence::new(self, 1.0);
             let residual = e.residual(&[], &e.fit(&[]));
-            let power = |r: &Vec<f64>| r[..self.fitted].iter().map(|v| v * v).sum::<f64>();
-            *left = residual
-                .iter()
-                .map(|r| power(r).max(f64::MIN_POSITIVE).ln())
-                .sum();
+            *left = e.log_power(&residual);
         }
         let better = usize::from(left[1] < left[0]);
         self.reverse_early(both[better], &nominal)

@@ -124,22 +124,13 @@ impl<'a> Searched<'a> {
         members.filter(|m| m.together >= T.confidence.claim)
     }
 
-    /// What is left with them: what else was tried and not claimed takes a little, too. Every joint counts by the logarithm of the
-    /// power that is left there, in its own unit and not in that of its noise: where more is assumed wrongly, more counts as
-    /// noise. What the prior says against the parameters comes on top.
+    /// What is left with them, with the penalty of the prior: what else was tried and not claimed takes a little, too. Where more
+    /// is assumed wrongly, more counts as noise, so it is not counted in units of that.
     fn left(&self) -> f64 {
         let members: Vec<&Projected> = self.claimed().map(|m| &m.candidate.projected).collect();
         let fit = self.evidence.fit(&members);
         let residual = self.evidence.residual(&members, &fit);
-        let (mut all, mut unlikely) = (0.0, self.evidence.j0 - fit.gain);
-        for (e, noise) in residual.iter().zip(&self.evidence.data.noise) {
-            let e = &e[..self.evidence.data.fitted];
-            let power: f64 = e.iter().map(|v| v * v).sum();
-            unlikely -= power;
-            let unit = noise.filter[0].powi(2);
-            all += e.len() as f64 * (power / unit).max(f64::MIN_POSITIVE).ln();
-        }
-        all + unlikely
+        self.evidence.log_power(&residual) + self.evidence.surprise(&fit, &residual)
     }
 
     /// By how much another may leave more and count as no worse: deviations squared of what the set leaves.

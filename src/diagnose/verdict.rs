@@ -23,7 +23,7 @@ pub use judge::Member;
 pub(super) use state::inflation;
 
 use super::catalogue::{Context, Effect};
-use super::evidence::{Evidence, Fit, Projected};
+use super::evidence::{Evidence, Projected};
 use super::search::Candidate;
 use super::thresholds::THRESHOLDS as T;
 use rayon::prelude::*;
@@ -92,11 +92,6 @@ pub fn decide(
         .with_max_len(1)
         .map(|i| judge::judge(&st, list, &set, i, &after, surprise_after))
         .collect();
-    take_coefficients(
-        &mut members,
-        &fit,
-        inflation(&residual, evidence.data.fitted),
-    );
     members.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
 
     // what is claimed decides what the verdict is measured against: an effect that hides in the parameters
@@ -148,17 +143,4 @@ fn held_out(st: &State, gap: &[f64]) -> bool {
     let rows = st.evidence.data.rows() - st.evidence.data.fitted;
     let least = T.gap.held_out * rows as f64;
     st.evidence.data.predicts() && gap.iter().any(|v| *v > least)
-}
-
-/// Gives the members, in the order of the set, their coefficients of the common fit.
-fn take_coefficients(members: &mut [Member], fit: &Fit, scale: f64) {
-    let mut at = 0;
-    for m in members {
-        let k = m.candidate.eta.len();
-        m.candidate.eta = fit.eta[at..at + k].to_vec();
-        m.std = (at..at + k)
-            .map(|i| fit.covariance[i][i].max(0.0).sqrt() * scale)
-            .collect();
-        at += k;
-    }
 }

@@ -97,6 +97,21 @@ pub fn from_fine(values: &[f64], count: usize, out: &mut Vec<f64>) {
     }
 }
 
+/// Two functions as of [`fine_values`], which are made together, averaged over the triangle.
+pub fn fine_pair(
+    [q, v, a]: [&[f64]; 3],
+    dt: f64,
+    mut f: impl FnMut(f64, f64, f64) -> [f64; 2],
+) -> [Vec<f64>; 2] {
+    let mut second = Vec::with_capacity(q.len() * FINE);
+    let first = fine_values(q, v, a, dt, |q, v, t| {
+        let [first, other] = f(q, v, t);
+        second.push(other);
+        first
+    });
+    [first, second].map(|values| sampled(&values, q.len()))
+}
+
 /// What [`from_fine`] gives, by itself.
 pub fn sampled(values: &[f64], count: usize) -> Vec<f64> {
     let mut out = Vec::with_capacity(count);

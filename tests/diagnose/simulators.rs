@@ -164,6 +164,14 @@ fn named(python: &str, seed: &str, arm: &str) {
     assert!(said.ends_with(right), "{said}");
 }
 
+/// Makes arms in MuJoCo, each of a seed, and asks that they end in a verdict with no name.
+fn ends_without_a_name(python: &str, verdict: &str, arms: [(&str, &str); 2]) {
+    for (seed, arm) in arms {
+        let said = an_arm(python, seed, arm, tempfile::tempdir().unwrap().path());
+        assert!(said.contains(&format!(": {verdict}; \n")), "{said}");
+    }
+}
+
 /// Makes an arm in MuJoCo, and what the diagnosis says of it.
 fn an_arm(python: &str, seed: &str, arm: &str, folder: &Path) -> String {
     let out = Command::new(python)
@@ -217,10 +225,7 @@ fn what_early_friction_of_mujoco_leaves_is_neither_a_delay_nor_a_gap() {
     let Some(python) = python::with("mujoco, numpy") else {
         return;
     };
-    for (seed, arm) in [("14", "18"), ("15", "0")] {
-        let said = an_arm(&python, seed, arm, tempfile::tempdir().unwrap().path());
-        assert!(said.contains(": no_gap; \n"), "{said}");
-    }
+    ends_without_a_name(&python, "no_gap", [("14", "18"), ("15", "0")]);
 }
 
 /// What a search leaves that takes friction not to reverse early counts as noise of its encoders, too: its residual was the smaller
@@ -230,8 +235,5 @@ fn a_search_of_mujocos_log_does_not_win_by_the_noise_it_makes() {
     let Some(python) = python::with("mujoco, numpy") else {
         return;
     };
-    for (seed, arm) in [("17", "14"), ("15", "23")] {
-        let said = an_arm(&python, seed, arm, tempfile::tempdir().unwrap().path());
-        assert!(said.contains(": unknown; \n"), "{said}");
-    }
+    ends_without_a_name(&python, "unknown", [("17", "14"), ("15", "23")]);
 }

@@ -1,7 +1,7 @@
 //! Torque that repeats with the turn of the motor.
 
 use super::*;
-use crate::diagnose::window::{FINE, fine_values, sampled};
+use crate::diagnose::window::fine_pair;
 use crate::signals::wiener::likewise;
 
 /// Cogging (torque ripple).
@@ -43,15 +43,10 @@ impl Effect for Cogging {
         let [mut sines, mut cosines] = [0, 1].map(|_| Vec::with_capacity(cx.data.rows()));
         for r in &cx.data.records {
             let ((q, v), a) = (r.state(j), r.acceleration(j));
-            let mut cosine = Vec::with_capacity(r.count * FINE);
-            let sine = fine_values(q, v, a, r.dt, |q, _, _| {
-                let (sin, cos) = (k * q).sin_cos();
-                cosine.push(cos);
-                sin
-            });
+            let [sine, cosine] = fine_pair([q, v, a], r.dt, |q, _, _| (k * q).sin_cos().into());
             // what no controller makes up for moves the motor: it shows where the motor's acceleration is known
-            for (all, fine) in [(&mut sines, sine), (&mut cosines, cosine)] {
-                all.extend(likewise(&sampled(&fine, r.count), r.cycle, r.dt));
+            for (all, wave) in [(&mut sines, sine), (&mut cosines, cosine)] {
+                all.extend(likewise(&wave, r.cycle, r.dt));
             }
         }
         vec![Column::on(j, sines), Column::on(j, cosines)]

@@ -2,7 +2,7 @@
 
 use super::Context;
 use crate::diagnose::column::Column;
-use crate::diagnose::window::{FINE, from_fine};
+use crate::diagnose::window::{FINE, sampled};
 
 /// How much of the begin of a record without periods is run through first: s at most, and swings of the spring.
 const BACK: (f64, f64) = (2.0, 15.0);
@@ -254,12 +254,12 @@ fn ways<const N: usize>(
     }
     values.map(|of| {
         of.map(|mut all| {
-            let mut out = Vec::new();
-            if !all.is_empty() {
-                all.truncate(fine);
-                from_fine(&all, n, &mut out);
+            if all.is_empty() {
+                return all;
             }
-            match cycle.filter(|cycle| n < count && !out.is_empty() && *cycle + 1 < n) {
+            all.truncate(fine);
+            let out = sampled(&all, n);
+            match cycle.filter(|cycle| n < count && *cycle + 1 < n) {
                 // its first sample is that after the period: the window of the very first has one side only
                 Some(cycle) => (0..count)
                     .map(|i| out[(i + cycle - 1) % cycle + 1])

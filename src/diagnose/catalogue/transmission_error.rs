@@ -2,7 +2,7 @@
 
 use super::spring::Springs;
 use super::*;
-use crate::diagnose::window::{FINE, fine_values, sampled};
+use crate::diagnose::window::{FINE, fine_pair, fine_values};
 use crate::signals::wiener::likewise;
 
 /// Transmission error.
@@ -163,15 +163,14 @@ impl TransmissionError {
 /// `1/k²` times the accelerations of `sin kq` and `cos kq`.
 fn shaken(r: &Series, j: usize, k: f64) -> [Vec<f64>; 2] {
     let ((q, v), a) = (r.state(j), r.acceleration(j));
-    let mut cosine = Vec::with_capacity(r.count * FINE);
+    let mut steps = 0..;
     // k q̈ cos kq − k² q̇² sin kq, and −k q̈ sin kq − k² q̇² cos kq
-    let sine = fine_values(q, v, a, r.dt, |q, v, _| {
-        let a = a[(cosine.len() / FINE).min(a.len() - 1)];
+    fine_pair([q, v, a], r.dt, |q, v, _| {
+        let step: usize = steps.next().unwrap_or_default();
+        let a = a[(step / FINE).min(a.len() - 1)];
         let (sin, cos) = (k * q).sin_cos();
-        cosine.push(-a / k * sin - v * v * cos);
-        a / k * cos - v * v * sin
-    });
-    [sampled(&sine, r.count), sampled(&cosine, r.count)]
+        [a / k * cos - v * v * sin, -a / k * sin - v * v * cos]
+    })
 }
 
 /// `1/k²` times the accelerations of a link on a spring that `e = sin kq` and `e = cos kq` move the end of:
@@ -181,25 +180,22 @@ fn swung(r: &Series, j: usize, [k, frequency]: [f64; 2]) -> [Vec<f64>; 2] {
     let omega = std::f64::consts::TAU * frequency;
     let h = r.dt / FINE as f64;
     let mut states: Option<[[f64; 2]; 2]> = None;
-    let mut cosine = Vec::with_capacity(r.count * FINE);
     let mut step = |q: f64, v: f64, _: f64| {
         let (sin, cos) = (k * q).sin_cos();
         let ends = [[sin, k * v * cos], [cos, -k * v * sin]];
         let states = states.get_or_insert(ends);
-        let accelerations = [0, 1].map(|w| {
+        [0, 1].map(|w| {
             let ([e, rate], [x, u]) = (ends[w], &mut states[w]);
             let a = omega * omega * (e - *x) + 2.0 * DAMPING * omega * (rate - *u);
             *u += h * a;
             *x += h * *u;
             a / (k * k)
-        });
-        cosine.push(accelerations[1]);
-        accelerations[0]
+        })
     };
     // a motion that repeats goes on as it was before
-    let before = r.cycle.map_or(0, |cycle| {
-        fine_values(&q[..cycle], &v[..cycle], &a[..cycle], r.dt, &mut step).len()
-    });
-    let sine = fine_values(q, v, a, r.dt, &mut step);
-    [sampled(&sine, r.count), sampled(&cosine[before..], r.count)]
+    if let Some(cycle) = r.cycle {
+        let [q, v, a] = [q, v, a].map(|x| &x[..cycle]);
+        fine_values(q, v, a, r.dt, |q, v, t| step(q, v, t)[0]);
+    }
+    fine_pair([q, v, a], r.dt, step)
 }

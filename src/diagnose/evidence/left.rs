@@ -1,5 +1,6 @@
 //! What a fit leaves: parameters, residuals, energies.
 
+use super::super::noise::Noise;
 use super::algebra::{backwards, dot, forwards};
 use super::{Energy, Evidence, Fit, Projected};
 use faer::Mat;
@@ -30,6 +31,28 @@ impl Evidence<'_> {
         x[(i, 0)] = self.spread[i];
         forwards(&self.l, &mut x);
         x.col(0).norm_l2()
+    }
+
+    /// Squares of a whitened residual on fitted rows, by actuator.
+    fn powers(&self, residual: &[Vec<f64>]) -> impl Iterator<Item = f64> {
+        let fitted = self.data.fitted;
+        let power = move |e: &Vec<f64>| e[..fitted].iter().map(|v| v * v).sum::<f64>();
+        residual.iter().map(power)
+    }
+
+    /// Penalty of the prior with a fit that leaves this residual.
+    pub fn surprise(&self, fit: &Fit, residual: &[Vec<f64>]) -> f64 {
+        self.j0 - fit.gain - self.powers(residual).sum::<f64>()
+    }
+
+    /// `Σ_j n ln Σ e²` of a residual on fitted rows: every actuator counts as with a noise of its own that is not known. It is
+    /// in the unit of the actuator and not of its noise, so that what is assumed of that noise does not decide.
+    pub fn log_power(&self, residual: &[Vec<f64>]) -> f64 {
+        let of = |(power, noise): (f64, &Noise)| {
+            let power = power / noise.filter[0].powi(2);
+            self.data.fitted as f64 * power.max(f64::MIN_POSITIVE).ln()
+        };
+        self.powers(residual).zip(&self.data.noise).map(of).sum()
     }
 
     fn reduced(&self, set: &[&Projected], fit: &Fit) -> Vec<f64> {

@@ -93,14 +93,12 @@ impl<'a> Beside<'a> {
         out
     }
 
-    /// Its coefficients over their deviations, where what the set leaves counts as noise.
-    pub fn deviations(&self) -> Vec<f64> {
+    /// Its coefficients in the fit of the whole set, and their standard deviations where what that leaves counts as noise.
+    pub fn coefficients(&self) -> [Vec<f64>; 2] {
         let scale = inflation(&self.residual[1], self.st.evidence.data.fitted);
-        let std = |k: usize| self.with.covariance[k][k].max(1e-300).sqrt() * scale;
-        self.own
-            .clone()
-            .map(|k| self.with.eta[k] / std(k))
-            .collect()
+        let std = |k: usize| self.with.covariance[k][k].max(0.0).sqrt() * scale;
+        let all = self.own.clone();
+        [self.with.eta[all.clone()].to_vec(), all.map(std).collect()]
     }
 
     /// Columns of the others.

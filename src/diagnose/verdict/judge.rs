@@ -66,9 +66,11 @@ pub fn judge(
             unsteady(evidence, with, &beside, m.with.gain, m.gain)
         }
     };
-    let together = together(&m, &rivals, decoys, unsteady);
+    let [eta, std] = m.coefficients();
+    let known = known_by_itself(&m, &eta, &std);
+    let together = known * together(&m, &rivals, decoys, unsteady);
     Member {
-        candidate: c.clone(),
+        candidate: Candidate { eta, ..c.clone() },
         confidence: together / (1.0 + against(st, c.effect, &rivals)),
         together,
         explains: m.explains().clamp(0.0, 1.0),
@@ -77,7 +79,7 @@ pub fn judge(
         decoys,
         unsteady,
         rivals,
-        std: Vec::new(),
+        std,
         frozen: m.frozen,
     }
 }
@@ -100,7 +102,6 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
         * explains_enough(m, rivals)
         * beside_larger(m)
         * ahead_of_friction(m)
-        * known_by_itself(m)
         * holds(m)
 }
 
@@ -153,15 +154,16 @@ fn ahead_of_friction(m: &Beside) -> f64 {
 /// Whether a body that shows in the parameters alone has a mass or first moments that are known, or a tensor that stands out
 /// still more. What the formula of another effect misses moves parameters that only together are known, and ten of any link can
 /// follow them.
-fn known_by_itself(m: &Beside) -> f64 {
+fn known_by_itself(m: &Beside, eta: &[f64], std: &[f64]) -> f64 {
     let moments = m.st.effects[m.member.effect].moments();
     if !m.frozen || moments == 0 {
         return 1.0;
     }
-    let all = m.deviations();
-    let largest = |all: &[f64]| all.iter().fold(0.0f64, |m, t| m.max(t.abs()));
-    let (first, tensor) = all.split_at(all.len().min(moments));
-    let known = largest(first).max(largest(tensor) / T.confidence.tensor);
+    let all = eta.iter().zip(std).map(|(x, s)| (x / s).abs());
+    let largest = |m: f64, t: f64| m.max(t);
+    let first = all.clone().take(moments).fold(0.0, largest);
+    let tensor = all.skip(moments).fold(0.0, largest);
+    let known = first.max(tensor / T.confidence.tensor);
     T.confidence.body.above(known)
 }
 

@@ -128,8 +128,7 @@ impl State<'_> {
 
     /// Penalty of the prior with a set.
     pub fn surprise(&self, fit: &Fit, residual: &[Vec<f64>]) -> f64 {
-        let fitted = self.evidence.data.fitted;
-        self.evidence.j0 - fit.gain - energy(residual, 0..fitted)
+        self.evidence.surprise(fit, residual)
     }
 
     /// Whether member `i` may show in nothing but the parameters that the nominal model would need.
