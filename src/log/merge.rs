@@ -33,23 +33,26 @@ fn time(table: &Table, format: Format) -> Option<(usize, f64)> {
     }
 }
 
-/// Calls the columns of files `FILE.COLUMN` where the names of the files say what they hold, each something else, and those of
-/// their columns do not: `q.csv`, `dq.csv` and `current_mA.csv`, each with the names of the joints.
+/// Calls the columns of files `FILE.COLUMN` where the names of two or more files say what they hold, each something else, and those
+/// of their columns do not: `q.csv`, `dq.csv` and `current_mA.csv`, each with the names of the joints.
 pub(crate) fn call_by_files(parts: &mut [(PathBuf, Read)]) {
     let says = |name: &str, format| names::named(name, format).map(|n| n.quantity);
     let holds = |name: &str, format| says(name, format).filter(|q| *q != Quantity::Time);
+    let own = |(_, part): &(PathBuf, Read)| {
+        let mut names = part.table.names.iter();
+        names.any(|n| holds(n, part.format).is_some())
+    };
     let stems: Vec<(String, Option<Quantity>)> = parts
         .iter()
         .map(|(path, part)| {
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-            let own = |n: &String| holds(n, part.format).is_some();
-            let known = part.table.names.iter().any(own);
-            let quantity = holds(&stem, part.format).filter(|_| !known);
+            let quantity = holds(&stem, part.format).filter(|q| *q != Quantity::Other);
             (stem.into_owned(), quantity)
         })
         .collect();
-    let distinct = |k: usize| !stems[..k].iter().any(|s| s.1 == stems[k].1);
-    if stems.len() < 2 || !(0..stems.len()).all(|k| stems[k].1.is_some() && distinct(k)) {
+    let told: Vec<Quantity> = stems.iter().filter_map(|s| s.1).collect();
+    let distinct = (0..told.len()).all(|k| !told[..k].contains(&told[k]));
+    if told.len() < 2 || !distinct || parts.iter().any(own) {
         return;
     }
     for ((_, part), (stem, _)) in parts.iter_mut().zip(stems) {

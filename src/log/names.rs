@@ -71,9 +71,9 @@ fn quantity(word: &str) -> Option<Quantity> {
         "q" | "qs" | "pos" | "posn" | "position" | "positions" | "angle" | "angles" | "qpos"
         | "qm" | "jpos" | "encoder" | "enc" | "winkel" | "lage" | "istposition" | "istwinkel"
         | "lageistwert" | "posicion" | "posizione" | "位置" | "角度" => Quantity::Position,
-        "dq" | "qd" | "qdot" | "vel" | "velocity" | "velocities" | "speed" | "speeds" | "qvel"
-        | "omega" | "geschwindigkeit" | "drehzahl" | "istgeschwindigkeit" | "istdrehzahl"
-        | "vitesse" | "velocidad" | "velocita" | "速度" => Quantity::Velocity,
+        "dq" | "qd" | "qdot" | "vel" | "velocity" | "velocities" | "speed" | "speeds" | "spd"
+        | "qvel" | "omega" | "geschwindigkeit" | "drehzahl" | "istgeschwindigkeit"
+        | "istdrehzahl" | "vitesse" | "velocidad" | "velocita" | "速度" => Quantity::Velocity,
         "ddq" | "qdd" | "qddot" | "acc" | "accel" | "acceleration" | "accelerations" | "qacc" => {
             Quantity::Acceleration
         }
@@ -89,6 +89,15 @@ fn quantity(word: &str) -> Option<Quantity> {
         }
         _ => return None,
     })
+}
+
+/// What a position becomes by the word that follows it, as in `q_dot` and `theta_ddot`.
+fn derived(words: &[String], at: usize) -> Option<Quantity> {
+    match words.get(at + 1)?.as_str() {
+        "dot" => Some(Quantity::Velocity),
+        "ddot" | "dotdot" => Some(Quantity::Acceleration),
+        _ => None,
+    }
 }
 
 /// Words of a command.
@@ -108,6 +117,11 @@ fn commands(word: &str) -> bool {
             | "control"
             | "soll"
             | "sollwert"
+            | "cmptd"
+            | "computed"
+            | "planned"
+            | "demand"
+            | "demanded"
     )
 }
 
@@ -139,6 +153,8 @@ fn elsewhere(word: &str) -> bool {
             | "index"
             | "id"
             | "seq"
+            | "error"
+            | "err"
     )
 }
 
@@ -146,16 +162,7 @@ fn elsewhere(word: &str) -> bool {
 fn foreign(word: &str) -> bool {
     let other = matches!(
         word,
-        "ext"
-            | "external"
-            | "disturbance"
-            | "error"
-            | "err"
-            | "std"
-            | "hat"
-            | "dtau"
-            | "theta"
-            | "dtheta"
+        "ext" | "external" | "disturbance" | "model" | "std" | "hat" | "dtau" | "theta" | "dtheta"
     );
     other || elsewhere(word)
 }
@@ -197,6 +204,7 @@ fn idle(word: &str) -> bool {
             | "actual"
             | "measured"
             | "meas"
+            | "raw"
             | "act"
             | "robot"
             | "field"
@@ -313,6 +321,9 @@ pub(crate) fn all(names: &[String], labels: &[[String; 2]], format: Format) -> V
             .zip(angles)
             .for_each(|(named, angle)| *named = named.take().or(angle));
     }
+    if !out.iter().any(|n| n.is_some() && !of_time(n)) {
+        measured_beside_commanded(names, &mut out);
+    }
     // what is left of a name, so that those of one message are told from others
     let rest = |name: &str, what: fn(&str) -> bool| -> Vec<String> {
         let all = words(name).into_iter();
@@ -337,6 +348,52 @@ pub(crate) fn all(names: &[String], labels: &[[String; 2]], format: Format) -> V
     out
 }
 
+fn of_time(named: &Option<Named>) -> bool {
+    named.as_ref().is_some_and(|n| n.quantity == Quantity::Time)
+}
+
+/// Names without a quantity, where as many say that they were measured as that they were commanded, `actual_3` and `desired_3`:
+/// positions and their commands.
+fn measured_beside_commanded(names: &[String], out: &mut [Option<Named>]) {
+    let measures = |w: &String| {
+        matches!(
+            w.as_str(),
+            "actual" | "act" | "measured" | "meas" | "feedback" | "ist"
+        )
+    };
+    let says = |name: &String| {
+        let words = words(name);
+        let number = number(&words)?;
+        let whole = |w: &String| idle(w) || commands(w) || w.parse::<usize>().is_ok();
+        let quantity = match (
+            words.iter().any(measures),
+            words.iter().any(|w| commands(w)),
+        ) {
+            (true, false) => Quantity::Position,
+            (false, true) => Quantity::Command,
+            _ => return None,
+        };
+        words.iter().all(whole).then_some((quantity, number))
+    };
+    let found: Vec<Option<(Quantity, usize)>> = names.iter().map(says).collect();
+    let count = |of| found.iter().flatten().filter(|f| f.0 == of).count();
+    let positions = count(Quantity::Position);
+    if positions == 0 || positions != count(Quantity::Command) {
+        return;
+    }
+    for ((name, found), out) in names.iter().zip(found).zip(out) {
+        let Some((quantity, number)) = found else {
+            continue;
+        };
+        *out = Some(Named {
+            quantity,
+            joint: None,
+            number: Some(number),
+            unit: unit_of(name, quantity, Format::Csv),
+        });
+    }
+}
+
 /// What a name says in which an angle is called theta.
 fn angle(name: &str) -> Option<Named> {
     let words = words(name);
@@ -346,14 +403,33 @@ fn angle(name: &str) -> Option<Named> {
         "ddtheta" | "thetaddot" | "thetadd" => Some(Quantity::Acceleration),
         _ => None,
     };
-    let quantity = words.iter().find_map(theta)?;
-    let plain = |w: &String| theta(w).is_some() || idle(w) || w.parse::<usize>().is_ok();
+    let at = words.iter().position(|w| theta(w).is_some())?;
+    let derived = derived(&words, at);
+    let quantity = derived.or(theta(&words[at]))?;
+    let dot = |w: &String| derived.is_some() && w.ends_with("dot");
+    let plain = |w: &String| theta(w).is_some() || idle(w) || w.parse::<usize>().is_ok() || dot(w);
     words.iter().all(plain).then(|| Named {
         quantity,
         joint: None,
         number: number(&words),
         unit: unit_of(name, quantity, Format::Csv),
     })
+}
+
+/// What a name says beside the quantity, whether it is a command, a joint's number or one of the words `of` joints:
+/// `["sm"]` of `TorqueSm1`.
+pub(crate) fn beside(name: &str, of: &[&str]) -> Vec<String> {
+    let joints: Vec<String> = of.iter().flat_map(|joint| words(joint)).collect();
+    let mut out = words(name);
+    if let Some(at) = out.iter().position(|w| quantity(w).is_some()) {
+        out.drain(at..=at + usize::from(derived(&out, at).is_some()));
+    }
+    // beside others, those of motors are their own
+    let says = |w: &String| {
+        commands(w) || idle(w) && !w.starts_with("motor") || w.parse::<usize>().is_ok()
+    };
+    out.retain(|w| !(says(w) || joints.contains(w)));
+    out
 }
 
 /// The last number of a name.
@@ -398,6 +474,8 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
         return by_unit(name, &words);
     };
     let mut what = quantity(&words[at])?;
+    let derived = derived(&words, at).filter(|_| what == Quantity::Position);
+    what = derived.unwrap_or(what);
     let desired = format == Format::Libfranka
         && (words.get(at + 1).is_some_and(|w| w == "d")
             || words.get(at + 1).is_some_and(|w| w == "j")
@@ -425,6 +503,7 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
         .filter(|w| {
             quantity(w).is_none() && !commands(w) && !idle(w) && w.parse::<usize>().is_err()
         })
+        .filter(|w| derived.is_none() || !w.ends_with("dot"))
         .collect();
     let joint = match rest.is_empty() || number.is_some() && format != Format::Csv {
         true => None,
@@ -607,6 +686,10 @@ mod tests {
             ("Achse4_Winkel_Soll", Format::Csv, Command, Some(4)),
             ("Drehmoment Achse 4 [Nm]", Format::Csv, Torque, Some(4)),
             ("Motorstrom Achse 4 [A]", Format::Csv, Current, Some(4)),
+            ("q_dot_4", Format::Csv, Velocity, Some(4)),
+            ("q_ddot_4", Format::Csv, Acceleration, Some(4)),
+            ("tau_model_4", Format::Csv, Other, Some(4)),
+            ("PositionCmptd4", Format::Csv, Command, Some(4)),
         ] {
             assert_eq!(says(name, format), Some((quantity, number)), "{name}");
         }
@@ -636,6 +719,31 @@ mod tests {
         assert_eq!(beside, [position, None, torque]);
         let franka = quantities(&["state.theta[0]"], Format::Libfranka);
         assert_eq!(franka, [None]);
+        let dotted = quantities(&["theta_1", "theta_dot_1", "theta_ddot_1"], Format::Csv);
+        let acceleration = Some(Quantity::Acceleration);
+        assert_eq!(dotted, [position, velocity, acceleration]);
+        let pairs = ["t", "actual_1", "desired_1", "error_1"];
+        let told = quantities(&pairs, Format::Csv);
+        let [time, command] = [Quantity::Time, Quantity::Command].map(Some);
+        assert_eq!(told, [time, position, command, None]);
+        assert_eq!(quantities(&["actual_1", "x_1"], Format::Csv), [None, None]);
+    }
+
+    #[test]
+    fn what_a_name_says_beside_quantity_and_joint_is_told() {
+        let joints = ["panda_joint1", "panda_joint2"];
+        for (name, says) in [
+            ("Position1", &[][..]),
+            ("q_raw_1", &[]),
+            ("q_dot_1", &[]),
+            ("panda_joint1_position", &[]),
+            ("TorqueCur1", &["cur"]),
+            ("q1_filtered", &["filtered"]),
+            ("motor_pos_1", &["motor"]),
+            ("e_q_1", &["e"]),
+        ] {
+            assert_eq!(beside(name, &joints), says, "{name}");
+        }
     }
 
     #[test]

@@ -13,6 +13,10 @@ const SHARE: f64 = 0.8;
 const RIGID: f64 = 0.4;
 /// Nats for each sample by which a delay must be better than none.
 const CLEAR: f64 = 0.05;
+/// … and one beyond so many seconds that most columns do not share: friction that the model lacks in one joint goes with it a
+/// little better.
+const ALONE: f64 = 0.35;
+const FAR: f64 = 0.02;
 
 /// A signal between its samples, `late` samples after each of `at`.
 pub(super) fn at_times(y: &[f64], at: &[usize], late: f64) -> Vec<f64> {
@@ -40,7 +44,7 @@ pub(super) fn delays(
     at: &[usize],
 ) -> Vec<f64> {
     let of = problem.best_joints(h, &mut Workspace::default());
-    torques
+    let found: Vec<(f64, f64)> = torques
         .iter()
         .zip(of)
         .map(|(&k, j)| {
@@ -51,13 +55,13 @@ pub(super) fn delays(
             let found = problem.shifted(h, j, &other);
             let left: Vec<f64> = found.iter().map(|m| (1.0 - m.share).max(1e-9)).collect();
             let Some(best) = (0..COUNT).min_by(|a, b| left[*a].total_cmp(&left[*b])) else {
-                return 0.0;
+                return (0.0, 0.0);
             };
             let none = (-FROM / STEP).round() as usize;
             let enough = found[best].share > SHARE && found[best].rigid > RIGID;
-            let clear = 0.5 * (left[none] / left[best]).ln() > CLEAR;
-            if !enough || !clear || best == 0 || best + 1 == COUNT {
-                return 0.0;
+            let gain = 0.5 * (left[none] / left[best]).ln();
+            if !enough || gain <= CLEAR || best == 0 || best + 1 == COUNT {
+                return (0.0, 0.0);
             }
             let (a, b, c) = (left[best - 1], left[best], left[best + 1]);
             let bend = a - 2.0 * b + c;
@@ -66,7 +70,16 @@ pub(super) fn delays(
             } else {
                 0.0
             };
-            FROM + STEP * (best as f64 + between.clamp(-0.5, 0.5))
+            (FROM + STEP * (best as f64 + between.clamp(-0.5, 0.5)), gain)
         })
-        .collect()
+        .collect();
+    let alike = |late: f64| {
+        let close = |f: &&(f64, f64)| f.1 > 0.0 && (f.0 - late).abs() < STEP;
+        2 * found.iter().filter(close).count() > found.len()
+    };
+    let clear = |&(late, gain): &(f64, f64)| match late < FAR || gain > ALONE || alike(late) {
+        true => late,
+        false => 0.0,
+    };
+    found.iter().map(clear).collect()
 }

@@ -286,24 +286,26 @@ fn group(out: &mut String, survey: &Survey, key: &str, means: Means) {
         parts.push(format!("without = [\"{what}\"]"));
     }
     let least = found.iter().map(|(_, c)| c.confidence).fold(1.0, f64::min);
-    let others: Vec<&str> = found
-        .iter()
-        .filter(|(_, c)| c.gain_of_others)
-        .filter_map(|(_, c)| c.joint.as_deref())
-        .collect();
-    let note = match means {
-        Means::Current if !scaled => {
-            "   # TODO: currents: state scale = [N m at the joint for each A]".into()
-        }
-        Means::Current if others.is_empty() => {
-            "; gains by the nominal model: state those of the drives in scale".into()
-        }
-        Means::Current => format!(
-            "; gains by the nominal model, of {} the middle of the others: state those of the drives in scale",
-            others.join(", ")
-        ),
-        _ => String::new(),
+    let joints = |of: &dyn Fn(&Claim) -> bool| {
+        let all = found.iter().filter(|(_, c)| of(c));
+        let all: Vec<&str> = all.filter_map(|(_, c)| c.joint.as_deref()).collect();
+        all.join(", ")
     };
+    let mut note = String::new();
+    if means == Means::Current && !scaled {
+        note += "   # TODO: currents: state scale = [N m at the joint for each A]";
+    } else if means == Means::Current {
+        let others = joints(&|c| c.gain_of_others);
+        let untold = joints(&|c| c.scale == factor);
+        note += "; gains by the nominal model";
+        if !others.is_empty() {
+            let _ = write!(note, ", of {others} the middle of the others");
+        }
+        if !untold.is_empty() {
+            let _ = write!(note, ", of {untold} not told: 1 stands for it");
+        }
+        note += ": state those of the drives in scale";
+    }
     let _ = match parts.is_empty() {
         true => writeln!(out, "{key} = {columns}   # confidence {least:.2}{note}"),
         false => writeln!(

@@ -38,6 +38,22 @@ pub(super) struct Smooth {
     pub grain: Vec<f64>,
 }
 
+/// Size of a column's second differences, of its spread; 0 where it is constant. The median: jumps of friction are no noise.
+pub(super) fn grain(y: &[f64]) -> f64 {
+    let spread = spread(y);
+    if !(spread > 0.0) {
+        return 0.0;
+    }
+    let bends = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+    crate::median::median(bends) / (spread / y.len() as f64).sqrt()
+}
+
+/// Sum of the squares of a column about its mean.
+fn spread(y: &[f64]) -> f64 {
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    y.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>()
+}
+
 /// How a column follows another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
@@ -67,10 +83,6 @@ impl Smooth {
             grain: Vec::new(),
         };
         for y in &frame.columns {
-            let spread = |v: &[f64]| {
-                let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
-                v.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>()
-            };
             let whole = spread(y);
             if !(whole > 0.0) || !whole.is_finite() {
                 out.value.push(Vec::new());
@@ -85,10 +97,7 @@ impl Smooth {
             };
             let rest: Vec<f64> = y.iter().zip(&low).map(|(a, b)| a - b).collect();
             out.rough.push((spread(&rest) / whole).sqrt());
-            // the median: jumps of friction are no noise
-            let bends = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
-            let spread_of = (whole / y.len() as f64).sqrt();
-            out.grain.push(crate::median::median(bends) / spread_of);
+            out.grain.push(grain(y));
             let slope = first_derivative(&low, frame.step);
             out.value.push(low.into_iter().step_by(each).collect());
             out.rate.push(slope.into_iter().step_by(each).collect());
@@ -176,8 +185,9 @@ pub(super) fn examine(
     positions_of_named(&smooth, claims, &moving);
     unnamed_pairs(&smooth, claims, &moving);
     commands(&smooth, claims, &moving);
-    if !robot {
-        number(claims);
+    match robot {
+        true => inherit(claims),
+        false => number(claims),
     }
 }
 
@@ -443,7 +453,12 @@ fn unnamed_pairs(smooth: &Smooth, claims: &mut [Claim], moving: &dyn Fn(usize) -
             }
         }
     }
-    fits.sort_by(|a, b| b.2.share.total_cmp(&a.2.share));
+    // what derives from a position that is named before what derives from anything else
+    let named = |f: &(usize, usize, Fit)| claims[f.0].named && claims[f.0].means == Means::Position;
+    fits.sort_by(|a, b| {
+        let order = named(b).cmp(&named(a));
+        order.then(b.2.share.total_cmp(&a.2.share))
+    });
     let mut used: Vec<usize> = Vec::new();
     let mut roots: Vec<usize> = Vec::new();
     let mut slopes: Vec<(usize, usize, f64)> = Vec::new();

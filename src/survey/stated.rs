@@ -12,6 +12,9 @@ const NAMED: f64 = 0.8;
 /// … and one of a recorder's own file, whose columns are documented.
 const DOCUMENTED: f64 = 0.9;
 
+/// Noise of torques, as a share of that of others, below which it is said that a model may have made them.
+const SMOOTH: f64 = 0.1;
+
 /// One claim a column, from its name alone.
 pub(super) fn claims(
     frames: &[Frame],
@@ -50,6 +53,17 @@ pub(super) fn claims(
                 Some(k) != frame.time && all[k].as_ref().is_some_and(|n| n.quantity == quantity)
             })
             .collect();
+        let (columns, others) = plain(columns, robot, frame);
+        for &k in &others {
+            out[k].abstain(&format!(
+                "its name says more than {}, and what that means is not known",
+                frame.names[columns[0]]
+            ));
+            out[k].of_no_joint = true;
+        }
+        if quantity == Quantity::Torque && !others.is_empty() {
+            warnings.push(one_of_several(frame, &columns, &others));
+        }
         if columns.is_empty() {
             continue;
         }
@@ -91,6 +105,47 @@ pub(super) fn claims(
     }
     magnitudes(frame, &mut out, warnings);
     out
+}
+
+/// Of `columns` of one quantity those whose names say no more than it and the joint, where each joint has one: `Torque1` beside
+/// `TorqueSm1`; and the others of its kind. All of them where no such choice is to be made.
+fn plain(columns: Vec<usize>, robot: Option<&Plant>, frame: &Frame) -> (Vec<usize>, Vec<usize>) {
+    let joints = robot.map_or(Vec::new(), |p| p.actuators());
+    let joints: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
+    let beside = |k: &usize| names::beside(&frame.names[*k], &joints);
+    let (plain, others): (Vec<usize>, Vec<usize>) =
+        columns.iter().partition(|k| beside(k).is_empty());
+    let least = if robot.is_some() { joints.len() } else { 2 };
+    let first = others.first().map(beside);
+    let alike = others.iter().filter(|k| Some(beside(k)) == first).count();
+    let whole = |count: usize| count == least || robot.is_none() && count > least;
+    match whole(plain.len()) && alike == plain.len() {
+        true => (plain, others),
+        false => (columns, Vec::new()),
+    }
+}
+
+/// Which torques were taken, and from which others: what a program computed may stand beside what was measured.
+fn one_of_several(frame: &Frame, taken: &[usize], others: &[usize]) -> Warning {
+    let called = |columns: &[usize]| {
+        let first = columns.first().map_or("", |&k| &frame.names[k]);
+        format!("{first} and {} more", columns.len().saturating_sub(1))
+    };
+    let grain = |columns: &[usize]| {
+        let of = |k: &usize| super::kinematics::grain(&frame.columns[*k]);
+        crate::median::median(columns.iter().map(of))
+    };
+    let smooth = match grain(taken) < SMOOTH * grain(others) {
+        true => "They have hardly any noise beside these: a model may have made them. ",
+        false => "",
+    };
+    let message = format!(
+        "the torques are taken from {}. {} are called torques, too. {smooth}State in [record.columns] which were \
+         measured",
+        called(taken),
+        called(others),
+    );
+    Warning::new(WarningKind::UnitSuspect, &frame.names[taken[0]], message)
 }
 
 /// Takes the joint from names that stand in the header more than once: which of them is meant is not known.
@@ -138,7 +193,17 @@ fn joints_of(
         .iter()
         .map(|&k| of(k).and_then(|n| n.joint.clone()).unwrap_or_default())
         .collect();
-    if found.iter().all(|f| !f.is_empty()) {
+    // one word for all and a number is a name only where the robot calls its joints so
+    let stem = |name: &str| -> String { name.chars().filter(|c| !c.is_ascii_digit()).collect() };
+    let counted_only = |robot: &[String]| {
+        let first = found.first().map_or(String::new(), |f| stem(f));
+        let own = robot.iter().any(|name| stem(name) == first);
+        found.len() > 1
+            && found.len() == robot.len()
+            && !own
+            && found.iter().all(|f| stem(f) == first)
+    };
+    if found.iter().all(|f| !f.is_empty()) && !counted_only(&own) {
         let refs: Vec<&str> = own.iter().map(String::as_str).collect();
         if robot.is_none() {
             for (i, name) in found.iter().enumerate() {

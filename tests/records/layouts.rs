@@ -465,6 +465,93 @@ fn files_of_a_quantity_each_are_one_record() {
     }
 }
 
+/// Also where one of them holds something else.
+#[test]
+fn a_file_that_is_called_by_nothing_known_stays_unknown() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let head: Vec<String> = (0..JOINTS).map(|j| m.joint(j)).collect();
+    let names = [("q", &m.q), ("tau", &m.tau), ("load_percent", &m.dq)];
+    let files = names.map(|(name, columns)| {
+        let path = folder.path().join(format!("{name}.csv"));
+        m.write(&path, &format!("t,{}", head.join(",")), &|i| {
+            row(vec![m.t[i].to_string()], i, &[columns])
+        });
+        path
+    });
+    let found = survey(&files, Some(&m.plant)).unwrap();
+    assert_eq!(found.frames.len(), 1);
+    expect(&found, Means::Position, &|j| format!("q.{}", m.joint(j)));
+    expect(&found, Means::Torque, &|j| format!("tau.{}", m.joint(j)));
+}
+
+/// Several groups of columns of one quantity, as a controller and a filter add them.
+#[test]
+fn of_several_groups_that_which_is_called_plainly_was_measured() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("groups.csv");
+    let names = [
+        "Position",
+        "PositionFiltered",
+        "e_q",
+        "Velocity",
+        "motor_velocity",
+        "Torque",
+        "TorqueCur",
+        "tau_model",
+    ];
+    let head: Vec<String> = names.iter().map(|n| numbered(n, 1)).collect();
+    let columns = [&m.q, &m.q, &m.dq, &m.dq, &m.dq, &m.tau, &m.dq, &m.tau].map(|c| &c[..]);
+    m.write(&path, &format!("Time,{}", head.join(",")), &|i| {
+        row(vec![m.t[i].to_string()], i, &columns)
+    });
+    for plant in [Some(&m.plant), None] {
+        let found = survey(std::slice::from_ref(&path), plant).unwrap();
+        expect(&found, Means::Position, &|j| format!("Position{}", j + 1));
+        expect(&found, Means::Velocity, &|j| format!("Velocity{}", j + 1));
+        expect(&found, Means::Torque, &|j| format!("Torque{}", j + 1));
+        let said = |w: &&excite::Warning| w.message.contains("TorqueCur1 and 5 more are called");
+        assert_eq!(found.warnings.iter().filter(said).count(), 1);
+    }
+}
+
+/// A word and a number, counted from zero, beside a robot that counts its joints from one.
+#[test]
+fn a_word_and_a_number_are_no_name_of_a_joint() {
+    let plant = Plant::load("panda").unwrap();
+    let all = simulated(&plant, 11);
+    let of = |means: Means| all.iter().filter(move |c| c.means == means);
+    let names = [(Means::Position, "arm_q"), (Means::Torque, "arm_tau")];
+    let mut columns = vec![("t".to_string(), of(Means::Time).next().unwrap())];
+    for (means, name) in names {
+        let mine = of(means).enumerate();
+        columns.extend(mine.map(|(j, c)| (format!("{name}_{j}"), c)));
+    }
+    let head: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    let mut text = head.join(",") + "\n";
+    for i in 0..columns[0].1.values.len() {
+        let cells: Vec<String> = columns
+            .iter()
+            .map(|(_, c)| c.values[i].to_string())
+            .collect();
+        let _ = writeln!(text, "{}", cells.join(","));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("counted.csv");
+    std::fs::write(&path, text).unwrap();
+    let found = self::of(&path, &plant);
+    for (j, joint) in plant.actuators().iter().enumerate() {
+        for name in ["arm_q", "arm_tau"] {
+            let column = format!("{name}_{j}");
+            let claim = found.claims.iter().find(|c| c.column == column).unwrap();
+            assert_eq!(claim.joint.as_ref(), Some(&joint.name), "{column}");
+        }
+    }
+    let said = |w: &&excite::Warning| w.message.contains("no column is called like it");
+    assert_eq!(found.warnings.iter().find(said), None);
+}
+
 /// A column that counts rows is no time.
 #[test]
 fn a_counter_is_no_time() {

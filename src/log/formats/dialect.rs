@@ -83,6 +83,10 @@ pub(super) fn canonical(text: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u
             match c {
                 b'"' | b'\'' if quoted == Some(c) => quoted = None,
                 b'"' | b'\'' if quoted.is_none() => quoted = Some(c),
+                b'(' if typed(out) => {
+                    depth += 1;
+                    empty_list = true;
+                }
                 b'[' | b'('
                     if quoted.is_some()
                         || depth > 0
@@ -124,6 +128,20 @@ pub(super) fn canonical(text: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u
         }
         out.extend(end);
     }
+}
+
+/// Takes away the name of a type that Python writes before a value, as in `np.float64(0.5)` and `array([0.5])`; whether there
+/// was one.
+fn typed(out: &mut Vec<u8>) -> bool {
+    let separates = |b: &u8| matches!(*b, b',' | b'\n');
+    let from = out.iter().rposition(separates).map_or(0, |at| at + 1);
+    let name = out[from..].trim_ascii();
+    let numpy = [&b"np."[..], b"numpy."].iter().any(|m| name.starts_with(m));
+    let known = numpy || matches!(name, b"array" | b"tensor");
+    if known {
+        out.truncate(from);
+    }
+    known
 }
 
 fn last(out: &[u8]) -> Option<u8> {
@@ -588,6 +606,19 @@ pub(super) fn strip(text: &[u8]) -> &[u8] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn types_that_python_writes_are_taken_away() {
+        let of = |text: &str| {
+            let mut out = Vec::new();
+            canonical(text.as_bytes(), b',', false, &mut out);
+            String::from_utf8(out).unwrap()
+        };
+        assert_eq!(of("np.float64(0.5),np.int64(3),0.1"), "0.5,3,0.1");
+        let lists = "0.1,\"[np.float32(0.5), np.float32(-1e-3)]\",array([1., 2.])";
+        assert_eq!(of(lists), "0.1,0.5,-1e-3,1.,2.");
+        assert_eq!(of("q1 (rad),dq1 (rad/s)"), "q1 (rad),dq1 (rad/s)");
+    }
 
     #[test]
     fn stamps_of_many_programs_are_one_time() {
