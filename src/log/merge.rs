@@ -35,7 +35,9 @@ fn time(table: &Table, format: Format) -> Option<(usize, f64)> {
 
 /// Calls the columns of files `FILE.COLUMN` where the names of two or more files say what they hold, each something else, and those
 /// of their columns do not: `q.csv`, `dq.csv` and `current_mA.csv`, each with the names of the joints.
-pub(crate) fn call_by_files(parts: &mut [(PathBuf, Read)]) {
+///
+/// So are those of files of a joint each, [`joint1.csv` and `joint2.csv`](of_a_joint_each), of a robot with so many `joints`.
+pub(crate) fn call_by_files(parts: &mut [(PathBuf, Read)], joints: Option<usize>) {
     let says = |name: &str, format| names::named(name, format).map(|n| n.quantity);
     let holds = |name: &str, format| says(name, format).filter(|q| *q != Quantity::Time);
     let own = |(_, part): &(PathBuf, Read)| {
@@ -52,7 +54,8 @@ pub(crate) fn call_by_files(parts: &mut [(PathBuf, Read)]) {
         .collect();
     let told: Vec<Quantity> = stems.iter().filter_map(|s| s.1).collect();
     let distinct = (0..told.len()).all(|k| !told[..k].contains(&told[k]));
-    if told.len() < 2 || !distinct || parts.iter().any(own) {
+    let quantities = told.len() > 1 && distinct && !parts.iter().any(own);
+    if !quantities && !of_a_joint_each(parts, joints) {
         return;
     }
     for ((_, part), (stem, _)) in parts.iter_mut().zip(stems) {
@@ -63,9 +66,39 @@ pub(crate) fn call_by_files(parts: &mut [(PathBuf, Read)]) {
     }
 }
 
+/// Whether files have the same columns, one of a position and none of whose quantities stands there twice, and are called by a word
+/// for a joint and its number.
+fn of_a_joint_each(parts: &[(PathBuf, Read)], joints: Option<usize>) -> bool {
+    let Some((_, first)) = parts.first() else {
+        return false;
+    };
+    let named = first.table.names.iter();
+    let mut quantities: Vec<Quantity> = named
+        .filter_map(|name| Some(names::named(name, first.format)?.quantity))
+        .filter(|q| *q != Quantity::Other)
+        .collect();
+    let count = quantities.len();
+    quantities.sort_unstable();
+    quantities.dedup();
+    let once = count == quantities.len() && quantities.contains(&Quantity::Position);
+    let alike = parts
+        .iter()
+        .all(|(_, part)| part.table.names == first.table.names);
+    let numbers: Option<Vec<usize>> = parts
+        .iter()
+        .map(|(path, _)| names::joint_of(&path.file_stem()?.to_string_lossy()))
+        .collect();
+    let distinct = numbers.is_some_and(|mut all| {
+        all.sort_unstable();
+        all.windows(2).all(|w| w[0] < w[1])
+    });
+    let as_many = joints.is_none_or(|n| n == parts.len());
+    parts.len() > 1 && as_many && once && alike && distinct
+}
+
 /// One table of all. Columns that several files have are called `FILE.COLUMN` in all but the first, or [in all](call_by_files).
 pub(crate) fn merge(mut parts: Vec<(PathBuf, Read)>) -> Result<(Table, Format)> {
-    call_by_files(&mut parts);
+    call_by_files(&mut parts, None);
     let mut parts = parts.into_iter();
     let Some((_, first)) = parts.next() else {
         return Err(Error::Argument("no log is named".into()));

@@ -432,6 +432,19 @@ pub(crate) fn beside(name: &str, of: &[&str]) -> Vec<String> {
     out
 }
 
+/// The number of a joint in a name that is a word for a joint and a number, as `axis_3`.
+pub(crate) fn joint_of(name: &str) -> Option<usize> {
+    let all = words(name);
+    let joint = |w: &String| {
+        matches!(
+            w.as_str(),
+            "joint" | "axis" | "motor" | "actuator" | "servo" | "j" | "achse" | "gelenk" | "axe"
+        )
+    };
+    let plain = |w: &String| joint(w) || w.parse::<usize>().is_ok();
+    (all.len() == 2 && all.iter().any(joint) && all.iter().all(plain)).then(|| number(&all))?
+}
+
 /// The last number of a name.
 fn number(words: &[String]) -> Option<usize> {
     words.iter().rev().find_map(|w| w.parse().ok())

@@ -101,7 +101,7 @@ pub fn survey_in_parts(
         };
         parts.push((path.clone(), formats::read(path, &request)?));
     }
-    merge::call_by_files(&mut parts);
+    merge::call_by_files(&mut parts, robot.map(|r| r.actuators().len()));
     topic = topic.or_else(|| parts.iter().find_map(|(_, r)| r.topic.clone()));
     let same = parts
         .windows(2)

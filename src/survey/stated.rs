@@ -194,16 +194,17 @@ fn joints_of(
         .map(|&k| of(k).and_then(|n| n.joint.clone()).unwrap_or_default())
         .collect();
     // one word for all and a number is a name only where the robot calls its joints so
-    let stem = |name: &str| -> String { name.chars().filter(|c| !c.is_ascii_digit()).collect() };
-    let counted_only = |robot: &[String]| {
-        let first = found.first().map_or(String::new(), |f| stem(f));
-        let own = robot.iter().any(|name| stem(name) == first);
-        found.len() > 1
-            && found.len() == robot.len()
-            && !own
-            && found.iter().all(|f| stem(f) == first)
-    };
-    if found.iter().all(|f| !f.is_empty()) && !counted_only(&own) {
+    let stem = |name: &String| -> String { name.chars().filter(|c| !c.is_ascii_digit()).collect() };
+    let first = found.first().map(stem);
+    let alike = |names: &[String]| names.iter().all(|name| Some(stem(name)) == first);
+    let counted_only = found.len() > 1
+        && found.len() == own.len()
+        && columns
+            .iter()
+            .all(|&k| of(k).is_some_and(|n| n.number.is_some()))
+        && alike(&found)
+        && !own.iter().any(|name| Some(stem(name)) == first);
+    if found.iter().all(|f| !f.is_empty()) && !counted_only {
         let refs: Vec<&str> = own.iter().map(String::as_str).collect();
         if robot.is_none() {
             for (i, name) in found.iter().enumerate() {

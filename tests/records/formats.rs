@@ -276,6 +276,27 @@ fn recorded_bags_are_read() {
             std::fs::write(&path, text).unwrap();
             Experiment::read(&path).unwrap().records.remove(0)
         };
+        // and surveyed, with the robot's joints by their names
+        let plant = Plant::load(robot).unwrap();
+        for file in files {
+            let found = excite::survey::survey(&[bags.join(file)], Some(&plant)).unwrap();
+            for joint in plant.actuators() {
+                let own = |c: &&excite::survey::Claim| c.joint.as_ref() == Some(&joint.name);
+                let of = |means| {
+                    found
+                        .claims
+                        .iter()
+                        .filter(own)
+                        .filter(move |c| c.means == means)
+                };
+                assert_eq!(
+                    of(excite::survey::Means::Position).count(),
+                    1,
+                    "{}",
+                    joint.name
+                );
+            }
+        }
         let (a, b) = (read(files[0]), read(files[1]));
         assert!(a.len().abs_diff(rows) < 3, "{robot}: {}", a.len());
         assert_eq!(a.len(), b.len());

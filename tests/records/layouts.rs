@@ -465,6 +465,34 @@ fn files_of_a_quantity_each_are_one_record() {
     }
 }
 
+/// Files of a joint each are one record of a robot with so many joints, and records of any other.
+#[test]
+fn files_of_a_joint_each_are_one_record() {
+    let m = Motion::new();
+    let folder = tempfile::tempdir().unwrap();
+    let files: Vec<PathBuf> = (0..JOINTS)
+        .map(|j| {
+            let path = folder.path().join(format!("joint_{}.csv", j + 1));
+            let columns = [&m.q, &m.dq, &m.tau].map(|c| &c[j..=j]);
+            m.write(&path, "time,position,velocity,torque", &|i| {
+                row(vec![m.t[i].to_string()], i, &columns)
+            });
+            path
+        })
+        .collect();
+    let found = survey(&files, Some(&m.plant)).unwrap();
+    assert_eq!(found.frames.len(), 1);
+    for (means, name) in [(Means::Position, "position"), (Means::Torque, "torque")] {
+        expect(&found, means, &|j| format!("joint_{}.{name}", j + 1));
+    }
+    let (_, read) = read_back(&found, folder.path());
+    for (a, b) in read.records[0].q.iter().zip(&m.q) {
+        assert_eq!(a[..100], b[..100]);
+    }
+    let two = Plant::load("planar2").unwrap();
+    assert_eq!(survey(&files[..3], Some(&two)).unwrap().frames.len(), 3);
+}
+
 /// Also where one of them holds something else.
 #[test]
 fn a_file_that_is_called_by_nothing_known_stays_unknown() {

@@ -5,8 +5,8 @@
 //! file. Lines that are no rows are left out and named.
 
 use super::dialect::{Cell, Dialect, canonical, idle, stamp, strip};
-use super::{Each, Skip};
-use crate::error::{Error, Result, Warning, WarningKind};
+use super::{Each, Skip, source};
+use crate::error::{Error, Result, Warning, WarningKind, listed};
 use crate::log::{Table, number};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -103,8 +103,8 @@ pub(crate) fn read_parts<T>(
     let most = rows.saturating_add(rows / 2);
     let mut given = 0;
     let mut checked = None;
-    let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
-    let size = file.metadata().map_or(0, |m| m.len());
+    let mut file = source::open(path).map_err(|e| Error::io(path, e))?.read;
+    let size = std::fs::metadata(path).map_or(0, |m| m.len());
     let mut block = vec![0u8; BLOCK.min(size as usize + 1).max(64 << 10)];
     let mut filled = 0;
     let mut table = Table::default();
@@ -138,6 +138,9 @@ pub(crate) fn read_parts<T>(
         let mut text = &block[..whole];
         if layout.is_none() {
             let dialect = Dialect::of(text).ok_or_else(|| no_numbers(path, text))?;
+            if let Some((column, turn)) = &dialect.turns {
+                return Err(in_turn(path, column, turn));
+            }
             text = strip(text);
             let first = text.iter().take(LINE).position(|b| *b == b'\n');
             for _ in 0..dialect.head {
@@ -638,11 +641,22 @@ fn rest(text: &[u8], from: usize, delimiter: u8, cells: &[Cell], keep: &[bool], 
     }
 }
 
+/// Rows that are of one joint each.
+fn in_turn(path: &Path, column: &str, turn: &[String]) -> Error {
+    let message = format!(
+        "its rows are of {} in turn, by its column {column}: a row must hold all of one time. With pandas: \
+         df.pivot(index=\"TIME\", columns=\"{column}\"), with the name of the column of times for TIME, and then to_csv with joined names",
+        listed(turn)
+    );
+    Error::file(path, "", message)
+}
+
 /// The names of the columns.
 pub(crate) fn names(path: &Path) -> Result<Vec<String>> {
-    let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+    let file = source::open(path).map_err(|e| Error::io(path, e))?;
     let mut text = Vec::new();
-    file.take(256 << 10)
+    file.read
+        .take(256 << 10)
         .read_to_end(&mut text)
         .map_err(|e| Error::io(path, e))?;
     match Dialect::of(&text) {

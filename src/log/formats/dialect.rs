@@ -36,6 +36,8 @@ pub(crate) struct Dialect {
     pub cells: Vec<Cell>,
     /// the text that a column of texts holds in all lines that were looked at
     pub texts: Vec<Option<String>>,
+    /// a column of texts that come in turn, and these: rows are of one joint each
+    pub turns: Option<(String, Vec<String>)>,
     /// lines before the first of numbers
     pub head: usize,
     /// a line that looks like names and was not used, because it has so many for other columns
@@ -322,6 +324,30 @@ impl Dialect {
             all.all(|t| t == one).then_some(one)
         };
         let texts: Vec<Option<String>> = kinds.iter().enumerate().map(same).collect();
+        let in_turn = |k: usize| {
+            let all: Vec<String> = rows.iter().map(|r| text(&r.1[k])).collect();
+            let period = all.iter().skip(1).position(|t| *t == all[0])? + 1;
+            let mut turn = all[..period].to_vec();
+            let repeats =
+                all.len() >= 4 * period && all.windows(period + 1).all(|w| w[0] == w[period]);
+            turn.sort_unstable();
+            turn.dedup();
+            // at one time each turn
+            let timed = (0..n).filter(|&k| kinds[k] != Cell::Text).any(|k| {
+                let mut each = rows.chunks_exact(period);
+                let mut last = None;
+                each.all(|turn| {
+                    let first = &turn[0].1[k];
+                    let next = last != Some(first) && turn.iter().all(|r| r.1[k] == *first);
+                    last = Some(first);
+                    next
+                })
+            });
+            let told = period > 1 && repeats && turn.len() == period && timed;
+            told.then(|| all[..period].to_vec())
+        };
+        let of_texts = (0..n).filter(|k| kinds[*k] == Cell::Text);
+        let turns = of_texts.into_iter().find_map(|k| Some((k, in_turn(k)?)));
         let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
         let full: usize = rows.iter().map(|r| numbers(&r.1)).sum();
         let cells_seen: usize = split
@@ -349,6 +375,7 @@ impl Dialect {
         {
             *last = Cell::Text;
         }
+        let turns = turns.map(|(k, turn)| (names.get(k).cloned().unwrap_or_default(), turn));
         let special = |l: &&[u8]| l.iter().any(|b| matches!(b, b'"' | b'\'' | b'[' | b'('));
         let plain = !comma
             && delimiter != b' '
@@ -362,6 +389,7 @@ impl Dialect {
                 names,
                 cells: kinds,
                 texts,
+                turns,
                 head: first,
                 unused,
             },
@@ -617,7 +645,7 @@ mod tests {
         assert_eq!(of("np.float64(0.5),np.int64(3),0.1"), "0.5,3,0.1");
         let lists = "0.1,\"[np.float32(0.5), np.float32(-1e-3)]\",array([1., 2.])";
         assert_eq!(of(lists), "0.1,0.5,-1e-3,1.,2.");
-        assert_eq!(of("q1 (rad),dq1 (rad/s)"), "q1 (rad),dq1 (rad/s)");
+        assert_eq!(of("q1(rad),dq1(rad/s)"), "q1(rad),dq1(rad/s)");
     }
 
     #[test]

@@ -10,12 +10,13 @@
 
 use super::arrays::{self, Array};
 use super::csv::{self, Left};
-use super::dialect;
+use super::{dialect, source};
 use crate::error::{Error, Result};
 use crate::log::Table;
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use std::collections::HashMap;
 use std::fmt;
+use std::io::Read as _;
 use std::path::Path;
 
 /// Columns at the most.
@@ -31,7 +32,10 @@ pub(super) fn begins(head: &[u8]) -> bool {
 }
 
 pub(super) fn read(path: &Path) -> Result<Table> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
+    let mut text = String::new();
+    source::open(path)
+        .and_then(|mut s| s.read.read_to_string(&mut text))
+        .map_err(|e| Error::io(path, e))?;
     let mut lines = (text.lines().enumerate()).filter(|(_, line)| !line.trim().is_empty());
     let (first, second) = (lines.next(), lines.next());
     let row = |line: &str| match serde_json::from_str(line) {

@@ -2,7 +2,7 @@
 //!
 //! | format | file | names of the columns |
 //! |---|---|---|
-//! | CSV of any layout, RTDE, libfranka, Kortex | `csv` | the header's, or numbers from 1; lists in cells as `name[0]` … |
+//! | CSV of any layout, RTDE, libfranka, Kortex; also packed or in UTF-16 (`source`) | `csv` | the header's, or numbers from 1; lists in cells as `name[0]` … |
 //! | rosbag2 | `db3`, `mcap` | `position/JOINT`, `velocity/JOINT`, `effort/JOINT`, … (`bag`) |
 //! | NumPy | `npz` | `array`, or `array[0]` … |
 //! | JSON, JSON Lines | `json` | `member`, `object.member`, `list[0]` … |
@@ -19,12 +19,12 @@ mod json;
 mod mat;
 mod mcap;
 mod npz;
+mod source;
 mod sqlite;
 
 use super::Table;
 use crate::error::{Error, Result};
 use crate::log::place::Place;
-use std::io::Read as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -288,19 +288,23 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
         let first = parts(path)?;
         return detect(first.first().map_or(path, |p| p.as_path()));
     }
-    let mut file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
     let mut head = [0u8; 132];
-    let mut filled = 0;
-    while filled < head.len() {
-        match file
-            .read(&mut head[filled..])
-            .map_err(|e| Error::io(path, e))?
-        {
-            0 => break,
-            n => filled += n,
-        }
+    let (packed, filled) = source::open(path)
+        .and_then(|mut s| Ok((s.packed, source::fill(&mut s.read, &mut head)?)))
+        .map_err(|e| Error::io(path, e))?;
+    let found = format_of_bytes(path, &head[..filled])?;
+    match packed && !(found.text() || found == Format::Json) {
+        true => Err(Error::file(
+            path,
+            "",
+            "the whole file is compressed; unpack it first",
+        )),
+        false => Ok(found),
     }
-    let head = &head[..filled];
+}
+
+/// The format of a file that begins so.
+fn format_of_bytes(path: &Path, head: &[u8]) -> Result<Format> {
     let refuse = |what: &str| Err(Error::file(path, "", what));
     if head.starts_with(b"SQLite format 3\0") {
         return Ok(Format::Db3);
@@ -323,12 +327,6 @@ pub(crate) fn detect(path: &Path) -> Result<Format> {
         return refuse(
             "it is a bag of ROS 1, which is not read; convert it with `rosbags-convert`",
         );
-    }
-    if head.starts_with(&[0x28, 0xb5, 0x2f, 0xfd]) || head.starts_with(&[0x1f, 0x8b]) {
-        return refuse("the whole file is compressed; unpack it first");
-    }
-    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return refuse("it is text in UTF-16; save it as UTF-8 (or plain CSV)");
     }
     if head.starts_with(b"PAR1") || head.starts_with(b"ARROW1") || head.starts_with(b"FEA1") {
         return refuse(

@@ -365,3 +365,27 @@ fn files_with_a_quantity_each_are_one_record() {
     let r = read(dir, "log = [\"log.txt\", \"torques.csv\"]").unwrap();
     assert!(r.len() >= COUNT - 1, "{}", r.len());
 }
+
+/// A row for each joint is refused with what to do, and a text that changes from row to row is none.
+#[test]
+fn rows_of_one_joint_each_are_refused() {
+    let dir = folder();
+    let path = dir.path().join("long.csv");
+    let table = |late: usize| {
+        let mut text = String::from("time,joint,position\n");
+        for i in 0..600 {
+            let name = ["shoulder", "elbow", "wrist"][i % 3];
+            let t = (i / 3 * 3 + i % 3 * late) as f64 * 1e-3;
+            let _ = writeln!(text, "{t},{name},{}", (t * 3.0).sin());
+        }
+        text
+    };
+    let read = |text: String| {
+        std::fs::write(&path, text).unwrap();
+        excite::survey::survey(std::slice::from_ref(&path), None).map(|_| ())
+    };
+    let said = read(table(0)).unwrap_err().to_string();
+    assert!(said.contains("shoulder,elbow,wrist in turn"), "{said}");
+    assert!(said.contains("pivot"), "{said}");
+    read(table(1)).unwrap();
+}
