@@ -209,6 +209,12 @@ impl<'a> Data<'a> {
         })
     }
 
+    /// How many of these rows have a weight, in the mean of the actuators.
+    pub fn weighted(&self, rows: std::ops::Range<usize>) -> f64 {
+        let of = |w: &Vec<f64>| w[rows.clone()].iter().filter(|w| **w > 0.0).count();
+        self.weights.iter().map(of).sum::<usize>() as f64 / self.joints() as f64
+    }
+
     /// Residuals of all records, actuator by actuator, with zeros where nothing was measured or the actuator
     /// stood still.
     pub fn silenced(&self, mut residual: Vec<Vec<f64>>) -> Vec<Vec<f64>> {

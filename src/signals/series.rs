@@ -16,6 +16,8 @@ use std::borrow::Cow;
 
 /// Fewest samples of a record.
 const LEAST: usize = 64;
+/// The most of a record that an end of it takes is one part of so many.
+const MOST_OF_ENDS: usize = 8;
 
 /// A record on a uniform grid with its motion.
 #[derive(Debug, Clone)]
@@ -295,6 +297,13 @@ impl Series {
             coarse,
             filters,
         } = differentiated(&q, &steps, count, cycles, dt);
+        if cycle.is_none() {
+            // what an end does to the positions of a coarse encoder reaches farther
+            let reach = filters.iter().flatten().map(Filter::reach).max();
+            let reach = reach.unwrap_or(0).min(count / MOST_OF_ENDS);
+            measured[..reach].fill(false);
+            measured[count - reach..].fill(false);
+        }
         let reference = reference.map(|columns| {
             let exact = vec![0.0; n];
             differentiated(&columns, &exact, count, cycles, dt).motion

@@ -21,6 +21,9 @@ pub const SMOOTH: f64 = 12.0;
 /// Share of the power of the acceleration that is noise, from which on an encoder is coarse: 4 % of its amplitude.
 const COARSE: f64 = 2e-3;
 
+/// Lines of a spectrum in a row that noise alone does not lift together.
+const LINES: usize = 3;
+
 /// Stretch of a record that its spectrum is averaged over, s.
 const STRETCH: f64 = 2.0;
 
@@ -245,6 +248,14 @@ impl Filter {
             apart: f[1] * dt,
             half,
         })
+    }
+
+    /// Samples over which an end of a record is felt: one and a half turns of the frequency from which on less than half passes.
+    pub fn reach(&self) -> usize {
+        let stops = |w: &[f64]| w.iter().all(|w| *w < 0.5);
+        let first = self.weight.windows(LINES).position(stops);
+        let first = first.unwrap_or(self.weight.len()).max(1);
+        (1.5 / (first as f64 * self.apart)).ceil() as usize
     }
 
     /// What is left of the amplitude at a frequency, over the sampling rate.

@@ -138,6 +138,11 @@ pub trait Effect: Sync {
     fn hides(&self) -> bool {
         false
     }
+    /// Whether the fall of the prior's penalty counts as its size where it explains nearly all of a small gap: a refit takes most of it
+    /// into parameters of all links, and leaves little.
+    fn moves_parameters(&self, _shape: &Shape) -> bool {
+        false
+    }
     /// Of a body, how many of its coefficients are mass and first moments, before those of its tensor; of others 0.
     fn moments(&self) -> usize {
         0

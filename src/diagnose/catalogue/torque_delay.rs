@@ -52,6 +52,10 @@ impl Effect for TorqueDelay {
         shape[0] > 0.0
     }
 
+    fn moves_parameters(&self, shape: &Shape) -> bool {
+        shape[0] > 0.0
+    }
+
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         Some(Element::Delay {
             joints: e.place.actuators(cx.data.joints()),

@@ -131,8 +131,14 @@ impl<'a> Beside<'a> {
     pub fn size(&self) -> f64 {
         match self.frozen {
             true => T.confidence.surprise.above(self.fall),
-            false => self.in_rows(),
+            false => self.in_rows().max(self.told_by_parameters()),
         }
+    }
+
+    /// How far the parameters tell of it, 0 to 1, where the residual shows little.
+    pub fn told_by_parameters(&self) -> f64 {
+        let [explains, fall] = [self.explains(), self.fall];
+        self.st.told_by_parameters(self.member, explains, fall)
     }
 
     /// Share of the gap on its joints that goes. The least that counts is taken off.
@@ -171,7 +177,8 @@ impl<'a> Beside<'a> {
         }
         let [w, a] = &self.residual;
         let kept = |e: &[Vec<f64>]| energy(e, data.fitted..data.rows());
-        (kept(w) - kept(a)) / held as f64 / (self.gain_in_rows() / self.fitted()).max(1e-9)
+        let there = self.gain_in_rows() / data.weighted(0..data.fitted).max(1.0);
+        (kept(w) - kept(a)) / data.weighted(data.fitted..data.rows()).max(1.0) / there.max(1e-9)
     }
 
     /// What it leaves on its joints, as the tests count it. Unit: noise variances.

@@ -141,6 +141,15 @@ impl State<'_> {
         hides(&set[i]) && !set.iter().any(shown)
     }
 
+    /// How far the parameters tell of an effect, 0 to 1, whose gap is small: it explains a share of that, and takes `fall` from the
+    /// penalty of the prior.
+    pub fn told_by_parameters(&self, c: &Candidate, explains: f64, fall: f64) -> f64 {
+        match self.effects[c.effect].moves_parameters(&c.shape) {
+            true => T.hidden.whole.above(explains) * T.confidence.surprise.above(fall),
+            false => 0.0,
+        }
+    }
+
     /// Joints on whose rows an effect acts most.
     pub fn joints_of(&self, c: &Candidate) -> Vec<usize> {
         c.place.actuators(self.evidence.data.joints())
