@@ -154,6 +154,7 @@ fn elsewhere(word: &str) -> bool {
             | "id"
             | "seq"
             | "error"
+            | "disturbance"
             | "err"
     )
 }
@@ -162,7 +163,7 @@ fn elsewhere(word: &str) -> bool {
 fn foreign(word: &str) -> bool {
     let other = matches!(
         word,
-        "ext" | "external" | "disturbance" | "model" | "std" | "hat" | "dtau" | "theta" | "dtheta"
+        "ext" | "external" | "model" | "std" | "hat" | "dtau" | "theta" | "dtheta"
     );
     other || elsewhere(word)
 }

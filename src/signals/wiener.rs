@@ -407,6 +407,43 @@ mod tests {
         }
     }
 
+    /// A motion that is cut out of a longer one: accelerations near its ends are wrong, and farther in they are not.
+    #[test]
+    fn an_end_is_felt_as_far_as_is_said() {
+        let (dt, count, tick) = (0.004, 2000, 2.0 * PI / 4096.0);
+        let lines = [(0.35, 0.5, 0.3), (0.85, 0.2, 1.1), (1.6, 0.06, 2.3)];
+        let of = |i: usize, power: i32| -> f64 {
+            let line = |(f, a, phase): &(f64, f64, f64)| {
+                let w = 2.0 * PI * f;
+                a * w.powi(power) * (w * dt * i as f64 + phase).sin()
+            };
+            lines.iter().map(line).sum()
+        };
+        let q: Vec<f64> = (0..count)
+            .map(|i| (of(i, 0) / tick).round() * tick)
+            .collect();
+        let filter = Filter::of(&q, tick * tick / 12.0, dt).unwrap();
+        let found = difference(&difference(&filter.pass(&q), dt), dt);
+        let error = |i: usize| (found[i] + of(i, 2)).powi(2);
+        let rms = |rows: std::ops::Range<usize>| {
+            (rows.clone().map(error).sum::<f64>() / rows.len() as f64).sqrt()
+        };
+        let reach = filter.reach();
+        assert!((20..250).contains(&reach), "{reach}");
+        let middle = rms(800..1200);
+        for [ends, within] in [
+            [0..reach, reach..2 * reach],
+            [count - reach..count, count - 2 * reach..count - reach],
+        ] {
+            assert!(
+                rms(within.clone()) < 3.0 * middle,
+                "{} {middle}",
+                rms(within)
+            );
+            assert!(rms(ends.clone()) > 5.0 * middle, "{} {middle}", rms(ends));
+        }
+    }
+
     #[test]
     fn coarse_steps_are_filtered_and_fine_ones_are_not() {
         let dt = 0.002;

@@ -129,7 +129,10 @@ fn plain(columns: Vec<usize>, robot: Option<&Plant>, frame: &Frame) -> (Vec<usiz
 fn one_of_several(frame: &Frame, taken: &[usize], others: &[usize]) -> Warning {
     let called = |columns: &[usize]| {
         let first = columns.first().map_or("", |&k| &frame.names[k]);
-        format!("{first} and {} more", columns.len().saturating_sub(1))
+        match columns.len() {
+            0 | 1 => first.to_string(),
+            n => format!("{first} and {} more", n - 1),
+        }
     };
     let grain = |columns: &[usize]| {
         let of = |k: &usize| super::kinematics::grain(&frame.columns[*k]);
@@ -140,8 +143,7 @@ fn one_of_several(frame: &Frame, taken: &[usize], others: &[usize]) -> Warning {
         false => "",
     };
     let message = format!(
-        "the torques are taken from {}. {} are called torques, too. {smooth}State in [record.columns] which were \
-         measured",
+        "the torques are taken from {}. Called torques, too: {}. {smooth}State in [record.columns] which were measured",
         called(taken),
         called(others),
     );

@@ -539,7 +539,7 @@ fn of_several_groups_that_which_is_called_plainly_was_measured() {
         expect(&found, Means::Position, &|j| format!("Position{}", j + 1));
         expect(&found, Means::Velocity, &|j| format!("Velocity{}", j + 1));
         expect(&found, Means::Torque, &|j| format!("Torque{}", j + 1));
-        let said = |w: &&excite::Warning| w.message.contains("TorqueCur1 and 5 more are called");
+        let said = |w: &&excite::Warning| w.message.contains("too: TorqueCur1 and 5 more.");
         assert_eq!(found.warnings.iter().filter(said).count(), 1);
     }
 }
