@@ -169,7 +169,8 @@ impl<'a> Beside<'a> {
         self.share_of(&w, &a, held as f64)
     }
 
-    /// Gain on holdout records per row against that on fitted ones: 1 where the same effect is at work there.
+    /// Gain on holdout records per row against that on fitted ones: 1 where the same effect is at work there. Behind coarse encoders
+    /// noise is not the same part of what filters leave of records that repeat and of others: a late torque counts over what stays of each.
     pub fn repeats(&self) -> f64 {
         let (data, held) = (self.st.evidence.data, self.held());
         if held == 0 || self.frozen {
@@ -177,8 +178,20 @@ impl<'a> Beside<'a> {
         }
         let [w, a] = &self.residual;
         let kept = |e: &[Vec<f64>]| energy(e, data.fitted..data.rows());
-        let there = self.gain_in_rows() / data.weighted(0..data.fitted).max(1.0);
-        (kept(w) - kept(a)) / data.weighted(data.fitted..data.rows()).max(1.0) / there.max(1e-9)
+        let rows = [0..data.fitted, data.fitted..data.rows()];
+        let count = rows.clone().map(|rows| data.weighted(rows).max(1.0));
+        let stays = |k: usize| {
+            let own = self.joints.iter().map(|j| &a[*j][rows[k].clone()]);
+            own.flatten().map(|v| v * v).sum::<f64>() / count[k]
+        };
+        let coarse = self.joints.iter().all(|j| data.counts_whitened(*j));
+        let late = self.st.effects[self.member.effect].moves_parameters(&self.member.shape);
+        let scale = match coarse && late {
+            true => (stays(0) / stays(1).max(1e-9)).max(1.0),
+            false => 1.0,
+        };
+        let there = self.gain_in_rows() / count[0];
+        scale * (kept(w) - kept(a)) / count[1] / there.max(1e-9)
     }
 
     /// What it leaves on its joints, as the tests count it. Unit: noise variances.
