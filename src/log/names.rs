@@ -93,6 +93,10 @@ fn quantity(word: &str) -> Option<Quantity> {
 
 /// What a position becomes by the word that follows it, as in `q_dot` and `theta_ddot`.
 fn derived(words: &[String], at: usize) -> Option<Quantity> {
+    let of = quantity(&words[at]);
+    if of.is_some_and(|of| of != Quantity::Position) {
+        return None;
+    }
     match words.get(at + 1)?.as_str() {
         "dot" => Some(Quantity::Velocity),
         "ddot" | "dotdot" => Some(Quantity::Acceleration),
@@ -177,9 +181,17 @@ pub(crate) fn of_no_joint(name: &str) -> bool {
     words.iter().any(|w| elsewhere(w)) || commanded() && other()
 }
 
+/// Words of what was measured.
+fn measured(word: &str) -> bool {
+    matches!(
+        word,
+        "actual" | "act" | "measured" | "meas" | "feedback" | "ist"
+    )
+}
+
 /// Words that say nothing of which joint it is.
 fn idle(word: &str) -> bool {
-    matches!(
+    let other = matches!(
         word,
         "joint"
             | "joints"
@@ -196,23 +208,17 @@ fn idle(word: &str) -> bool {
             | "giunto"
             | "关节"
             | "軸"
-            | "ist"
             | "istwert"
             | "motor"
             | "motors"
             | "state"
             | "states"
-            | "actual"
-            | "measured"
-            | "meas"
             | "raw"
-            | "act"
             | "robot"
             | "field"
             | "msg"
             | "data"
             | "j"
-            | "feedback"
             | "fb"
             | "rad"
             | "deg"
@@ -224,7 +230,8 @@ fn idle(word: &str) -> bool {
             | "s"
             | "per"
             | "as"
-    )
+    );
+    other || measured(word)
 }
 
 /// A name as the header has it, where a number was added because it stands there more than once.
@@ -356,18 +363,12 @@ fn of_time(named: &Option<Named>) -> bool {
 /// Names without a quantity, where as many say that they were measured as that they were commanded, `actual_3` and `desired_3`:
 /// positions and their commands.
 fn measured_beside_commanded(names: &[String], out: &mut [Option<Named>]) {
-    let measures = |w: &String| {
-        matches!(
-            w.as_str(),
-            "actual" | "act" | "measured" | "meas" | "feedback" | "ist"
-        )
-    };
     let says = |name: &String| {
         let words = words(name);
         let number = number(&words)?;
         let whole = |w: &String| idle(w) || commands(w) || w.parse::<usize>().is_ok();
         let quantity = match (
-            words.iter().any(measures),
+            words.iter().any(|w| measured(w)),
             words.iter().any(|w| commands(w)),
         ) {
             (true, false) => Quantity::Position,
@@ -488,7 +489,7 @@ pub(crate) fn named(name: &str, format: Format) -> Option<Named> {
         return by_unit(name, &words);
     };
     let mut what = quantity(&words[at])?;
-    let derived = derived(&words, at).filter(|_| what == Quantity::Position);
+    let derived = derived(&words, at);
     what = derived.unwrap_or(what);
     let desired = format == Format::Libfranka
         && (words.get(at + 1).is_some_and(|w| w == "d")
@@ -755,6 +756,7 @@ mod tests {
             ("q1_filtered", &["filtered"]),
             ("motor_pos_1", &["motor"]),
             ("e_q_1", &["e"]),
+            ("tau_dot_1", &["dot"]),
         ] {
             assert_eq!(beside(name, &joints), says, "{name}");
         }

@@ -44,7 +44,7 @@ pub(super) fn delays(
     at: &[usize],
 ) -> Vec<f64> {
     let of = problem.best_joints(h, &mut Workspace::default());
-    let found: Vec<(f64, f64)> = torques
+    let found: Vec<Option<(f64, f64)>> = torques
         .iter()
         .zip(of)
         .map(|(&k, j)| {
@@ -54,14 +54,12 @@ pub(super) fn delays(
                 .collect();
             let found = problem.shifted(h, j, &other);
             let left: Vec<f64> = found.iter().map(|m| (1.0 - m.share).max(1e-9)).collect();
-            let Some(best) = (0..COUNT).min_by(|a, b| left[*a].total_cmp(&left[*b])) else {
-                return (0.0, 0.0);
-            };
+            let best = (0..COUNT).min_by(|a, b| left[*a].total_cmp(&left[*b]))?;
             let none = (-FROM / STEP).round() as usize;
             let enough = found[best].share > SHARE && found[best].rigid > RIGID;
             let gain = 0.5 * (left[none] / left[best]).ln();
             if !enough || gain <= CLEAR || best == 0 || best + 1 == COUNT {
-                return (0.0, 0.0);
+                return None;
             }
             let (a, b, c) = (left[best - 1], left[best], left[best + 1]);
             let bend = a - 2.0 * b + c;
@@ -70,16 +68,14 @@ pub(super) fn delays(
             } else {
                 0.0
             };
-            (FROM + STEP * (best as f64 + between.clamp(-0.5, 0.5)), gain)
+            Some((FROM + STEP * (best as f64 + between.clamp(-0.5, 0.5)), gain))
         })
         .collect();
     let alike = |late: f64| {
-        let close = |f: &&(f64, f64)| f.1 > 0.0 && (f.0 - late).abs() < STEP;
-        2 * found.iter().filter(close).count() > found.len()
+        let close = found.iter().flatten().filter(|f| (f.0 - late).abs() < STEP);
+        2 * close.count() > found.len()
     };
-    let clear = |&(late, gain): &(f64, f64)| match late < FAR || gain > ALONE || alike(late) {
-        true => late,
-        false => 0.0,
-    };
-    found.iter().map(clear).collect()
+    let clear = |&(late, gain): &(f64, f64)| late < FAR || gain > ALONE || alike(late);
+    let of = |f: &Option<(f64, f64)>| f.filter(clear).map_or(0.0, |(late, _)| late);
+    found.iter().map(of).collect()
 }

@@ -7,6 +7,7 @@
 
 use super::claim::{Claim, Means};
 use super::frame::{Frame, richest};
+use super::search::spread;
 use super::units::{TURN, extent};
 use crate::error::{Warning, WarningKind};
 use crate::signals::Butterworth;
@@ -40,18 +41,16 @@ pub(super) struct Smooth {
 
 /// Size of a column's second differences, of its spread; 0 where it is constant. The median: jumps of friction are no noise.
 pub(super) fn grain(y: &[f64]) -> f64 {
-    let spread = spread(y);
-    if !(spread > 0.0) {
-        return 0.0;
+    match spread(y) {
+        whole if whole > 0.0 => grain_of(y, whole),
+        _ => 0.0,
     }
-    let bends = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
-    crate::median::median(bends) / (spread / y.len() as f64).sqrt()
 }
 
-/// Sum of the squares of a column about its mean.
-fn spread(y: &[f64]) -> f64 {
-    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
-    y.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>()
+/// The same where the squares about the mean are known.
+fn grain_of(y: &[f64], whole: f64) -> f64 {
+    let bends = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs());
+    crate::median::median(bends) / (whole / y.len() as f64).sqrt()
 }
 
 /// How a column follows another.
@@ -97,7 +96,7 @@ impl Smooth {
             };
             let rest: Vec<f64> = y.iter().zip(&low).map(|(a, b)| a - b).collect();
             out.rough.push((spread(&rest) / whole).sqrt());
-            out.grain.push(grain(y));
+            out.grain.push(grain_of(y, whole));
             let slope = first_derivative(&low, frame.step);
             out.value.push(low.into_iter().step_by(each).collect());
             out.rate.push(slope.into_iter().step_by(each).collect());

@@ -330,7 +330,7 @@ impl<'a> Problem<'a> {
 }
 
 /// Squares about the mean.
-fn spread(y: &[f64]) -> f64 {
+pub(super) fn spread(y: &[f64]) -> f64 {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     y.iter().map(|x| (x - mean) * (x - mean)).sum()
 }

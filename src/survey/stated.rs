@@ -198,14 +198,14 @@ fn joints_of(
     // one word for all and a number is a name only where the robot calls its joints so
     let stem = |name: &String| -> String { name.chars().filter(|c| !c.is_ascii_digit()).collect() };
     let first = found.first().map(stem);
-    let alike = |names: &[String]| names.iter().all(|name| Some(stem(name)) == first);
+    let alike = |name: &String| Some(stem(name)) == first;
     let counted_only = found.len() > 1
         && found.len() == own.len()
         && columns
             .iter()
             .all(|&k| of(k).is_some_and(|n| n.number.is_some()))
-        && alike(&found)
-        && !own.iter().any(|name| Some(stem(name)) == first);
+        && found.iter().all(alike)
+        && !own.iter().any(alike);
     if found.iter().all(|f| !f.is_empty()) && !counted_only {
         let refs: Vec<&str> = own.iter().map(String::as_str).collect();
         if robot.is_none() {

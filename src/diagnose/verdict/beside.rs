@@ -60,7 +60,12 @@ impl<'a> Beside<'a> {
         let without = st.gap(&r0, true);
         let surprise_without = st.surprise(&f0, &r0);
         let mut out = Beside {
-            matters: st.matters(member, set.len(), &without, after),
+            matters: st.matters(
+                member,
+                set.len(),
+                [&without, after],
+                surprise_without - surprise_after,
+            ),
             gain: with.gain - f0.gain,
             fall: surprise_without - surprise_after,
             residual: [r0, r1],
@@ -131,14 +136,12 @@ impl<'a> Beside<'a> {
     pub fn size(&self) -> f64 {
         match self.frozen {
             true => T.confidence.surprise.above(self.fall),
-            false => self.in_rows().max(self.told_by_parameters()),
+            false => {
+                let [explains, fall] = [self.explains(), self.fall];
+                let told = self.st.told_by_parameters(self.member, explains, fall);
+                self.in_rows().max(told)
+            }
         }
-    }
-
-    /// How far the parameters tell of it, 0 to 1, where the residual shows little.
-    pub fn told_by_parameters(&self) -> f64 {
-        let [explains, fall] = [self.explains(), self.fall];
-        self.st.told_by_parameters(self.member, explains, fall)
     }
 
     /// Share of the gap on its joints that goes. The least that counts is taken off.
@@ -214,10 +217,9 @@ impl<'a> Beside<'a> {
     /// Share of the whole gap that it explains: of the frozen model's, where it hides in the parameters.
     pub fn explains(&self) -> f64 {
         let st = self.st;
-        let after = st.above(self.after, true);
         match self.frozen {
-            true => 1.0 - after / self.whole(&st.evidence.r, true).max(1e-9),
-            false => (st.above(&self.without, true) - after) / st.total.max(1e-9),
+            true => 1.0 - st.above(self.after, true) / self.whole(&st.evidence.r, true).max(1e-9),
+            false => st.explains(&self.without, self.after),
         }
     }
 

@@ -151,9 +151,7 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
         || predicted > T.confidence.predicts.centre;
     if significant && generalises {
         let after = st.gap(&r1, true);
-        let explains = (st.above(&gap, true) - st.above(&after, true)) / st.total.max(1e-9);
-        let told = st.told_by_parameters(&set[i], explains, prior);
-        let worth = st.matters(&set[i], set.len(), &gap, &after).max(told);
+        let worth = st.matters(&set[i], set.len(), [&gap, &after], prior);
         let enters =
             worth > T.entry.claimable && (st.remembers(&set[i]) || predicted > T.entry.claimable);
         // one that lives in the parameters is judged by them, if the residual hardly shows it

@@ -95,10 +95,7 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
     m.size()
         * shown_on_both(data, m.member, r0, r1)
         * unsteady.map_or(1.0, |u| T.confidence.unsteady.below(u))
-        * match m.frozen {
-            true => 1.0,
-            false => m.matters.max(m.told_by_parameters()),
-        }
+        * if m.frozen { 1.0 } else { m.matters }
         * T.confidence.predicts.above(predicted)
         * T.confidence.exceeds.below(predicted)
         * decoys.map_or(1.0, |d| T.confidence.decoys.below(d))

@@ -141,6 +141,11 @@ impl State<'_> {
         hides(&set[i]) && !set.iter().any(shown)
     }
 
+    /// Share of the whole gap that goes between two gaps by actuator, fitted records.
+    pub fn explains(&self, without: &[f64], with: &[f64]) -> f64 {
+        (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9)
+    }
+
     /// How far the parameters tell of an effect, 0 to 1, whose gap is small: it explains a share of that, and takes `fall` from the
     /// penalty of the prior.
     pub fn told_by_parameters(&self, c: &Candidate, explains: f64, fall: f64) -> f64 {
@@ -162,15 +167,21 @@ impl State<'_> {
 
     /// Whether an effect explains enough to be a finding, 0 to 1, from the gap by actuator without it
     /// and with it. An effect that explains almost nothing is not a finding, nor is one in a gap no larger
-    /// than a sound model leaves. `members` are in the set.
-    pub fn matters(&self, c: &Candidate, members: usize, without: &[f64], with: &[f64]) -> f64 {
+    /// than a sound model leaves, unless the `fall` of the prior's penalty [tells of it](Self::told_by_parameters). `members` are in the set.
+    pub fn matters(
+        &self,
+        c: &Candidate,
+        members: usize,
+        [without, with]: [&[f64]; 2],
+        fall: f64,
+    ) -> f64 {
         let rows = self.evidence.data.fitted as f64;
         let joints = self.joints_of(c);
         let over = |gap: &[f64]| -> f64 {
             let floor = self.floor * rows;
             joints.iter().map(|j| (gap[*j] - floor).max(0.0)).sum()
         };
-        let explains = (self.above(without, true) - self.above(with, true)) / self.total.max(1e-9);
+        let explains = self.explains(without, with);
         // a refit moves what lives in parameters to other joints
         let moved = over(without) == 0.0 && self.effects[c.effect].hides();
         let seen = match moved {
@@ -183,10 +194,11 @@ impl State<'_> {
             true => T.matters.ringing.above(own),
             false => 1.0,
         };
-        T.matters.of_joints.above(seen)
+        let shown = T.matters.of_joints.above(seen)
             * T.matters.of_all.above(explains)
             * T.matters.gap.scaled(self.scale(members)).above(there)
-            * ringing
+            * ringing;
+        shown.max(self.told_by_parameters(c, explains, fall))
     }
 }
 

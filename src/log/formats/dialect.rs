@@ -324,30 +324,7 @@ impl Dialect {
             all.all(|t| t == one).then_some(one)
         };
         let texts: Vec<Option<String>> = kinds.iter().enumerate().map(same).collect();
-        let in_turn = |k: usize| {
-            let all: Vec<String> = rows.iter().map(|r| text(&r.1[k])).collect();
-            let period = all.iter().skip(1).position(|t| *t == all[0])? + 1;
-            let mut turn = all[..period].to_vec();
-            let repeats =
-                all.len() >= 4 * period && all.windows(period + 1).all(|w| w[0] == w[period]);
-            turn.sort_unstable();
-            turn.dedup();
-            // at one time each turn
-            let timed = (0..n).filter(|&k| kinds[k] != Cell::Text).any(|k| {
-                let mut each = rows.chunks_exact(period);
-                let mut last = None;
-                each.all(|turn| {
-                    let first = &turn[0].1[k];
-                    let next = last != Some(first) && turn.iter().all(|r| r.1[k] == *first);
-                    last = Some(first);
-                    next
-                })
-            });
-            let told = period > 1 && repeats && turn.len() == period && timed;
-            told.then(|| all[..period].to_vec())
-        };
-        let of_texts = (0..n).filter(|k| kinds[*k] == Cell::Text);
-        let turns = of_texts.into_iter().find_map(|k| Some((k, in_turn(k)?)));
+        let turns = (0..n).find_map(|k| Some((k, in_turn(&rows, &kinds, k)?)));
         let total = split.iter().filter(|(i, _)| *i >= first).count().max(1);
         let full: usize = rows.iter().map(|r| numbers(&r.1)).sum();
         let cells_seen: usize = split
@@ -395,6 +372,33 @@ impl Dialect {
             },
         ))
     }
+}
+
+/// Texts that come in turn in column `k`, each turn at one time, by a column that is the same in all of its rows and in no two turns.
+fn in_turn(rows: &[&(usize, Vec<Vec<u8>>)], kinds: &[Cell], k: usize) -> Option<Vec<String>> {
+    if kinds[k] != Cell::Text {
+        return None;
+    }
+    let all: Vec<String> = rows.iter().map(|r| text(&r.1[k])).collect();
+    let period = all.iter().skip(1).position(|t| *t == all[0])? + 1;
+    let mut different = all[..period].to_vec();
+    different.sort_unstable();
+    different.dedup();
+    let repeats = all.len() >= 4 * period && all.windows(period + 1).all(|w| w[0] == w[period]);
+    if period < 2 || different.len() < period || !repeats {
+        return None;
+    }
+    let timed = |k: usize| {
+        let mut last = None;
+        rows.chunks_exact(period).all(|turn| {
+            let first = &turn[0].1[k];
+            let next = last != Some(first) && turn.iter().all(|r| r.1[k] == *first);
+            last = Some(first);
+            next
+        })
+    };
+    let mut others = (0..kinds.len()).filter(|&k| kinds[k] != Cell::Text);
+    others.any(timed).then(|| all[..period].to_vec())
 }
 
 /// Names of the columns that `ros2 topic echo --csv` writes of a `JointState`, without a header: stamp in seconds and nanoseconds,

@@ -3,7 +3,7 @@
 use miniz_oxide::inflate::stream::{InflateState, inflate};
 use miniz_oxide::{DataFormat, MZFlush, MZStatus};
 use std::fs::File;
-use std::io::{self, Chain, Cursor, Read};
+use std::io::{self, BufRead, BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
 /// First bytes of what is packed.
@@ -179,42 +179,41 @@ impl<R: Read> Read for Gzip<R> {
 
 /// Frames of zstd one after another.
 struct Zstd {
-    /// `None` after an error
+    /// `None` at the end and after an error
     frame: Option<Frame>,
 }
 
-type Frame =
-    ruzstd::decoding::StreamingDecoder<Looked<Box<dyn Read>>, ruzstd::decoding::FrameDecoder>;
+type Frame = ruzstd::decoding::StreamingDecoder<
+    BufReader<Looked<Box<dyn Read>>>,
+    ruzstd::decoding::FrameDecoder,
+>;
 
 impl Zstd {
     fn new(read: Looked<Box<dyn Read>>) -> io::Result<Self> {
-        let frame = Some(frame(read)?);
+        let frame = frame(BufReader::with_capacity(BLOCK, read)).map(Some)?;
         Ok(Zstd { frame })
     }
 }
 
-fn frame(read: Looked<Box<dyn Read>>) -> io::Result<Frame> {
+fn frame(read: BufReader<Looked<Box<dyn Read>>>) -> io::Result<Frame> {
     let broken = |e| damaged(&format!("the packed data are damaged ({e})"));
     Frame::new(read).map_err(broken)
 }
 
 impl Read for Zstd {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        loop {
-            let Some(mut now) = self.frame.take() else {
-                return Ok(0);
-            };
+        while let Some(mut now) = self.frame.take() {
             let count = now.read(to)?;
             if count > 0 || to.is_empty() {
                 self.frame = Some(now);
                 return Ok(count);
             }
-            let (head, rest) = look(Box::new(now.into_inner()) as Box<dyn Read>)?;
-            if head.is_empty() {
-                return Ok(0);
+            let mut rest = now.into_inner();
+            if !rest.fill_buf()?.is_empty() {
+                self.frame = Some(frame(rest)?);
             }
-            self.frame = Some(frame(rest)?);
         }
+        Ok(0)
     }
 }
 
@@ -319,6 +318,10 @@ mod tests {
         frames.extend(ruzstd::encoding::compress_to_vec(b, level));
         assert_eq!(unpacked(&frames).unwrap(), (text, true));
         assert!(unpacked(&frames[..frames.len() - 9]).is_err());
+        // however many there are
+        let one = ruzstd::encoding::compress_to_vec(&b"1,2\n"[..], level);
+        let many = unpacked(&one.repeat(20_000)).unwrap();
+        assert_eq!(many, ("1,2\n".repeat(20_000), true));
     }
 
     #[test]
