@@ -85,7 +85,7 @@ pub(super) fn names(cx: &Context, place: &Place) -> Vec<String> {
     named.map(|j| actuators[j].name.clone()).collect()
 }
 
-fn estimate(place: Place, shape: &Shape, eta: &[f64], std: &[f64]) -> Estimate {
+pub(super) fn estimate(place: Place, shape: &Shape, eta: &[f64], std: &[f64]) -> Estimate {
     Estimate {
         place,
         shape: shape.clone(),

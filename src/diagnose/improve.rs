@@ -11,7 +11,7 @@
 //! with the entropic distance `d` of [`consistent`], the barrier that keeps
 //! every body inside.
 
-use super::catalogue::{self, Context, Effect, Estimate};
+use super::catalogue::{self, Context, Effect, Estimate, Value};
 use super::evidence::Evidence;
 use super::finding::{Finding, names};
 use super::forward::effects_torque;
@@ -41,16 +41,28 @@ pub struct Improved {
     pub scene: Option<export::Edited>,
 }
 
+/// The improved model as it can be simulated along the records.
+pub struct Made {
+    /// the model for the files
+    pub improved: Improved,
+    /// parameters that go with the torque of its effects
+    pub phi: Vec<f64>,
+    /// that torque along the recorded motions, by actuator
+    pub torque: Vec<Vec<f64>>,
+    /// what is not as it was fitted
+    pub warnings: Vec<Warning>,
+}
+
 /// The robot with the parameters `phi` of the fit and what was claimed. The nominal one where, as it stands in the files,
-/// less of the records that were not fitted is left with that: `frozen` is the gap to it.
+/// less of the records that were not fitted is left with that: `nominal` are its parameters, `frozen` the gap to it.
 pub fn improve(
     evidence: &Evidence,
     cx: &Context,
     effects: &[Box<dyn Effect>],
-    phi: &[f64],
+    [nominal, phi]: [&[f64]; 2],
     findings: &[Finding],
     frozen: &[Vec<f64>],
-) -> (Improved, Vec<Warning>) {
+) -> Made {
     let (data, plant) = (cx.data, cx.data.plant);
     let count = plant.parameters().len();
     let left = |e: &[Vec<f64>]| -> f64 {
@@ -63,26 +75,38 @@ pub fn improve(
         .filter_map(|f| Some((named(effects, f)?, estimate(f))))
         .collect();
     let found = written(evidence, cx, &phi[..count], &claims);
-    if !data.predicts() {
-        return found.improved(plant);
-    }
     let claimed = claims
         .iter()
         .map(|(effect, e)| (*effect, e.place, &e.shape, &e.eta[..]));
-    let mut values = data.without_allowance(phi);
-    values[..count].copy_from_slice(&found.values);
-    let mut torque = data.model_torque(&values);
-    for (row, more) in torque.iter_mut().zip(effects_torque(cx, claimed)) {
+    let made = |written: Written, phi: &[f64], torque: Vec<Vec<f64>>| {
+        let mut phi = data.without_allowance(phi);
+        phi[..count].copy_from_slice(&written.values);
+        let (improved, warnings) = written.improved(plant);
+        Made {
+            improved,
+            phi,
+            torque,
+            warnings,
+        }
+    };
+    let added = effects_torque(cx, claimed);
+    let found = made(found, phi, added);
+    if !data.predicts() {
+        return found;
+    }
+    let mut torque = data.model_torque(&found.phi);
+    for (row, more) in torque.iter_mut().zip(&found.torque) {
         row.iter_mut().zip(more).for_each(|(t, v)| *t += v);
     }
     let [before, after] = [left(frozen), left(&data.gap_that_counts(&torque))];
     if after <= before + data.joints() as f64 * T.improved.seen.powi(2) {
-        return found.improved(plant);
+        return found;
     }
     // a file that predicts worse than the model that is there helps nobody
-    let nominal = written(evidence, cx, &evidence.phi[..count], &[]);
-    let (improved, mut warnings) = nominal.improved(plant);
-    warnings.push(Warning::new(
+    let as_it_was = written(evidence, cx, &nominal[..count], &[]);
+    let none = vec![vec![0.0; data.rows()]; data.joints()];
+    let mut kept = made(as_it_was, nominal, none);
+    kept.warnings.push(Warning::new(
         WarningKind::WorseThanNominal,
         plant.name(),
         match before {
@@ -96,7 +120,7 @@ pub fn improve(
                 .to_string(),
         },
     ));
-    (improved, warnings)
+    kept
 }
 
 /// An effect that a model has.
@@ -172,13 +196,7 @@ pub(super) fn written(
                 false => joints.join(", "),
             },
             equation: card.equation,
-            values: values
-                .iter()
-                .map(|v| {
-                    let line = format!("{} = {:.6} {}", v.name, v.value, v.unit);
-                    line.trim_end().to_string()
-                })
-                .collect(),
+            values: values.iter().map(Value::line).collect(),
             held: effect.apply(cx, estimate, &mut robot),
             element: catalogue::element(cx, *effect, estimate),
         });

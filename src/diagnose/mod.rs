@@ -9,6 +9,7 @@
 //! |---|---|---|
 //! | records | `Series`, `noise`, `window` | motion and derivatives, noise floor, whitening |
 //! | prior | `prior`, `closeness` | how far a model may be off, how close an identified one is |
+//! | friction | `lacking` | that of a robot whose file states none |
 //! | loads | `payload` | what the robot carried: known, unknown or nothing |
 //! | nominal | `data`, `rigid`, [`evidence`] | what the nominal model absorbs, at the price of its prior |
 //! | effects | [`catalogue`] | columns of every effect at every place |
@@ -43,6 +44,7 @@ pub(crate) mod improve;
 pub(crate) mod interval;
 #[doc(hidden)]
 pub mod json;
+mod lacking;
 #[doc(hidden)]
 pub mod next;
 pub(crate) mod noise;
@@ -87,6 +89,7 @@ use crate::plant::Plant;
 use crate::signals::series::Series;
 use channel::Assumed;
 use data::Data;
+use lacking::Beyond;
 use payload::Loads;
 use rayon::prelude::*;
 use searched::Searched;
@@ -153,13 +156,27 @@ pub fn diagnose(
 ///
 /// # Errors
 /// As [`prepare`].
-pub fn of_logs<'a>(
-    plant: &'a Plant,
+pub fn of_logs(
+    plant: &Plant,
     logs: &[log::Record],
     settings: &Settings,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
     progress("noise and nominal model");
+    match lacking::with_friction(plant, logs)? {
+        Some(with) => of_plant(&with, Some(plant), logs, settings, progress),
+        None => of_plant(plant, None, logs, settings, progress),
+    }
+}
+
+/// Diagnoses logs of a robot with its friction, where its `file` states none.
+fn of_plant<'a>(
+    plant: &'a Plant,
+    file: Option<&Plant>,
+    logs: &[log::Record],
+    settings: &Settings,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Diagnosis> {
     let mut logs = Cow::Borrowed(logs);
     let mut plain = gathered(plant, &logs, Loads::One)?;
     let mut data = plain.clone().completed(Assumed::default())?;
@@ -209,20 +226,45 @@ pub fn of_logs<'a>(
     let members = decision.projected();
     let fit = evidence.fit(&members);
     let phi_after = evidence.parameters(&members, &fit);
-    let frozen = data.gap_that_counts(&data.model_torque(&evidence.phi));
     let left = [&[][..], &members].map(|set| evidence.residual(set, &evidence.fit(set)));
-    let [refit, after] = left.each_ref().map(|e| evidence.in_torque(e));
+    let lacked = file.map(|file| {
+        let found = Beyond {
+            evidence: &evidence,
+            cx: &cx,
+            effects: &effects,
+            left: left.each_ref().map(|e| &e[..]),
+            phi: &phi_after,
+            seed: settings.seed,
+        };
+        found.lacked(file)
+    });
+    // the gap is counted from the file
+    let (nominal, refitted, [of_file, of_refit]) = match &lacked {
+        Some(l) => (&l.nominal, &l.refit, l.residuals.each_ref()),
+        None => (&evidence.phi, &cx.phi, [&evidence.r, &left[0]]),
+    };
+    let frozen = data.gap_that_counts(&data.model_torque(nominal));
+    let [refit, after] = [of_refit, &left[1]].map(|e| evidence.in_torque(e));
     let mut findings = finding::findings(&evidence, &cx, &effects, &decision, settings.seed);
     let fitted = |r: &Series| r.fit;
-    let residual_gap = gap::joints(&evidence, &refit, &left[0], fitted);
+    let residual_gap = gap::joints(&evidence, &refit, of_refit, fitted);
+    let improve::Made {
+        mut improved,
+        phi: phi_improved,
+        torque: added,
+        mut warnings,
+    } = improve::improve(
+        &evidence,
+        &cx,
+        &effects,
+        [nominal, &phi_after],
+        &findings,
+        &frozen,
+    );
     progress("forward simulation");
-    let all = decision.members.iter().map(|m| &m.candidate);
-    let all = all.map(|c| (effects[c.effect].as_ref(), c.place, &c.shape, &c.eta[..]));
-    let added = forward::effects_torque(&cx, all);
-    let held = controller::identify(data, &evidence.phi);
-    let forward = forward::forward(data, [&evidence.phi, &cx.phi, &phi_after], &added, held);
-    let (improved, mut warnings) =
-        improve::improve(&evidence, &cx, &effects, &phi_after, &findings, &frozen);
+    let held = controller::identify(data, nominal);
+    let forward = forward::forward(data, [nominal, refitted, &phi_improved], &added, held);
+    drop(added);
     let posterior = (settings.samples > 0).then(|| {
         progress("samples");
         posterior::sample(&evidence, &cx, &effects, &decision, &after, settings)
@@ -231,7 +273,13 @@ pub fn of_logs<'a>(
     let units: Vec<&'static str> = (0..data.joints()).map(|j| cx.torque_unit(j)).collect();
     let at_rest = at_rest::find(data, &units);
     warnings.extend(at_rest::warnings(&at_rest));
-    let much = too_much(&residual_gap, data);
+    let much = match lacked {
+        None => too_much(&residual_gap, data),
+        Some(_) => {
+            let beside = evidence.in_torque(&left[0]);
+            too_much(&gap::joints(&evidence, &beside, &left[0], fitted), data)
+        }
+    };
     let honest = match (decision.verdict, much) {
         (Verdict::NoGap, true) => Verdict::Unknown,
         (verdict, _) => verdict,
@@ -258,14 +306,26 @@ pub fn of_logs<'a>(
         progress("next experiment");
         next::propose(&evidence, &cx, &effects, &list, &findings, settings)
     });
-    let scaled = evidence.as_counted(&left[0]);
+    let scaled = evidence.as_counted(of_refit);
+    let verdict = match &lacked {
+        Some(lacked) => {
+            lacked.remark(plant, &mut improved);
+            lacked.told(verdict, &mut findings)
+        }
+        None => verdict,
+    };
+    warnings.extend(file.map(lacking::warning));
+    let (holdout, unexplained) = match &lacked {
+        Some(l) => (l.holdout, l.unexplained),
+        None => (decision.holdout, decision.unexplained),
+    };
     Ok(Diagnosis {
         robot: plant.name().to_string(),
         joints: plant.actuators().iter().map(|j| j.name.clone()).collect(),
         units,
         verdict,
         findings,
-        frozen: gap::joints(&evidence, &frozen, &evidence.r, fitted),
+        frozen: gap::joints(&evidence, &frozen, of_file, fitted),
         refit: residual_gap,
         explained: gap::joints(&evidence, &after, &left[1], fitted),
         shares: gap::shares(data, &scaled),
@@ -278,15 +338,15 @@ pub fn of_logs<'a>(
             &evidence,
             &phi_after,
             [&frozen, &refit, &after],
-            [&evidence.r, &left[0], &left[1]],
+            [of_file, of_refit, &left[1]],
         ),
-        holdout: data.predicts().then_some(decision.holdout),
+        holdout: data.predicts().then_some(holdout),
         moves: data.moves(),
         at_rest,
         second_encoder,
         stands_out: decision.stands_out || much,
         unexplained: if data.moves() {
-            decision.unexplained
+            unexplained
         } else {
             1.0
         },
@@ -304,6 +364,7 @@ pub fn of_logs<'a>(
         closeness: data.closeness,
         window: data.window,
         lead: data.lead,
+        friction_found: file.is_some(),
         turns_in_part: (0..data.joints()).any(|j| data.turns_in_part(j)),
     })
 }

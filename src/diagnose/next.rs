@@ -18,7 +18,7 @@
 mod motions;
 mod trial;
 
-use super::catalogue::{Context, Effect};
+use super::catalogue::{Context, Effect, Place};
 use super::data::Data;
 use super::evidence::Evidence;
 use super::finding::Finding;
@@ -73,12 +73,17 @@ pub fn propose(
         .with_max_len(1)
         .map(|t| t.overlap(evidence, cx, FINE.shapes).unwrap_or(1.0))
         .collect();
-    // invisible with one shape only is not invisible
-    (targets, now) = std::iter::zip(targets, now)
+    // a pair that the records tell apart needs no motion; invisible with one shape only is not invisible
+    let open = |(i, (_, now)): &(usize, (_, f64))| match *i < first_hidden {
+        true => *now > T.next.apart,
+        false => *now > 1.0 - INVISIBLE,
+    };
+    let kept: Vec<(usize, (Target, f64))> = std::iter::zip(targets, now)
         .enumerate()
-        .filter(|(i, (_, now))| *i < first_hidden || *now > 1.0 - INVISIBLE)
-        .map(|(_, both)| both)
-        .unzip();
+        .filter(open)
+        .collect();
+    let first_hidden = kept.iter().filter(|(i, _)| *i < first_hidden).count();
+    (targets, now) = kept.into_iter().map(|(_, both)| both).unzip();
     if targets.is_empty() {
         return None;
     }
@@ -146,8 +151,12 @@ fn pairs<'a>(effects: &'a [Box<dyn Effect>], findings: &'a [Finding]) -> Vec<Tar
     else {
         return Vec::new();
     };
+    // a rival of another finding says nothing of this one
+    let robot = |f: &Finding| f.place == Place::Robot;
+    let there = |f: &Finding| robot(f) || robot(main) || f.place.meets(&main.place);
     let near = |f: &&Finding| {
-        !f.member && f.effect != main.effect && f.confidence > T.next.near * main.confidence
+        let believed = f.confidence > T.next.near * main.confidence;
+        !f.member && f.effect != main.effect && believed && there(f)
     };
     let placed = |f: &'a Finding| Placed::of_finding(effects, f);
     findings
@@ -242,8 +251,8 @@ fn why(target: &Target, also: &[&Target], overlap: [f64; 2], data: &Data) -> Str
         Target::Pair(a, b) => {
             let (a, title) = (a.words(&joints), b.effect.card().title);
             format!(
-                "{a} and {title} explain the records at hand almost equally well; in the proposed motion {title} \
-                 could imitate {then:.0} % of it instead of {now:.0} %"
+                "{title} comes near {a}: it could imitate {now:.0} % of it in the records at hand, and {then:.0} % \
+                 in the proposed motion"
             )
         }
         Target::Hidden(a, _) => {

@@ -69,7 +69,7 @@ impl Data<'_> {
     }
 
     /// Root mean square of the torques of an actuator in the fitted records.
-    fn torque_rms(&self, j: usize) -> f64 {
+    pub(super) fn torque_rms(&self, j: usize) -> f64 {
         let (mut power, mut count) = (0.0, 0.0f64);
         for r in self.records.iter().filter(|r| r.fit) {
             let heard = self.heard(r, j);

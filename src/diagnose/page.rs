@@ -35,11 +35,6 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             (true, true) => f.title.to_string(),
             (true, false) => format!("{} on {}", f.title, f.joints.join(" and ")),
         };
-        // each with how sure it is, unless all are
-        let each = |f: &&Finding| match sure {
-            true => plain(f),
-            false => format!("{} ({} sure)", plain(f), percent(f.confidence)),
-        };
         match (claims.as_slice(), d.findings.first()) {
             ([], Some(f)) if !f.same.is_empty() => format!(
                 "{} or {}, which these records do not tell apart",
@@ -47,7 +42,7 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                 f.same.join(" or ").replace('_', " ")
             ),
             ([], Some(f)) => format!("{} ({} sure)", plain(&f), percent(f.confidence)),
-            _ => claims.iter().map(each).collect::<Vec<_>>().join("; "),
+            _ => by_effect(&claims, |all| alike(all, sure, plain)),
         }
     };
     let held = d.shrink().map(|gone| 1.0 - gone);
@@ -67,6 +62,12 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             percent(d.unexplained)
         ),
         None => format!("{with}{} of the gap stays", percent(d.unexplained)),
+    };
+    let left = match d.verdict {
+        Verdict::PartlyExplained if d.friction_alone() => {
+            format!("{left}, and no other effect of the catalogue explains it")
+        }
+        _ => left,
     };
     match d.verdict {
         Verdict::NoGap => (
@@ -119,6 +120,70 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                 }
             },
         ),
+    }
+}
+
+/// What is said of the findings of each effect, in the order of their first ones.
+fn by_effect(claims: &[&Finding], said: impl Fn(&[&Finding]) -> String) -> String {
+    let mut kinds: Vec<Vec<&Finding>> = Vec::new();
+    for f in claims {
+        // what is in some records only, or on the whole robot, is named by itself
+        let joins = |kind: &&mut Vec<&Finding>| {
+            kind[0].effect == f.effect && !f.joints.is_empty() && f.records.is_empty()
+        };
+        match kinds.iter_mut().find(joins) {
+            Some(kind) => kind.push(f),
+            None => kinds.push(vec![f]),
+        }
+    }
+    kinds
+        .iter_mut()
+        .for_each(|kind| kind.sort_by_key(|f| f.place.first()));
+    let all: Vec<String> = kinds.iter().map(|kind| said(kind)).collect();
+    all.join("; ")
+}
+
+/// One effect at all its places, each with how sure it is unless all are; of many places the least.
+fn alike(all: &[&Finding], sure: bool, plain: impl Fn(&&Finding) -> String) -> String {
+    const MANY: usize = 4;
+    // nothing is wholly sure
+    let sure_of = |c: f64| percent(c.min(0.999));
+    let confidence = |f: &&Finding| format!("({} sure)", sure_of(f.confidence));
+    let place = |f: &&Finding| f.joints.join(" and ");
+    let first = &all[0];
+    match (all, sure) {
+        ([_], true) => plain(first),
+        ([_], false) => format!("{} {}", plain(first), confidence(first)),
+        (_, true) => {
+            let places: Vec<String> = all.iter().map(place).collect();
+            format!("{} on {}", first.title, listed(&places))
+        }
+        (few, false) if few.len() < MANY => {
+            let places: Vec<String> = few
+                .iter()
+                .map(|f| format!("{} {}", place(f), confidence(f)))
+                .collect();
+            format!("{} on {}", first.title, listed(&places))
+        }
+        (many, false) => {
+            let places: Vec<String> = many.iter().map(place).collect();
+            let least = many.iter().map(|f| f.confidence).fold(1.0, f64::min);
+            format!(
+                "{} on {} (each at least {} sure)",
+                first.title,
+                listed(&places),
+                sure_of(least)
+            )
+        }
+    }
+}
+
+/// `a, b and c`.
+fn listed(all: &[String]) -> String {
+    match all {
+        [] => String::new(),
+        [one] => one.clone(),
+        [others @ .., last] => format!("{} and {last}", others.join(", ")),
     }
 }
 

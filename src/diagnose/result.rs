@@ -6,6 +6,7 @@ use super::data::Data;
 use super::evidence::Evidence;
 use super::finding::Finding;
 use super::forward::Forward;
+use super::lacking;
 use super::gap::{self, JointGap, Shares};
 use super::improve::Improved;
 use super::next::{INVISIBLE, Proposal};
@@ -103,11 +104,19 @@ pub struct Diagnosis {
     pub window: f64,
     /// time by which the dry friction of the model reverses before the velocity does, s
     pub lead: f64,
+    /// whether the robot file states no friction and the records show some, which is among the findings
+    pub friction_found: bool,
     /// whether a small share of such friction counts as no gap, for how it turns is known in part only
     pub turns_in_part: bool,
 }
 
 impl Diagnosis {
+    /// Whether friction that the robot file does not state is all that is claimed.
+    pub(super) fn friction_alone(&self) -> bool {
+        let claims = || self.findings.iter().filter(|f| f.is_claim());
+        self.friction_found && claims().all(|f| lacking::is_term(f.effect))
+    }
+
     /// Share of the gap on holdout records that vanishes with what was found, where they show one.
     pub(super) fn shrink(&self) -> Option<f64> {
         let shown = self.holdout.filter(|[before, _]| *before > 0.0);

@@ -20,14 +20,13 @@ mod rivals;
 mod state;
 
 pub use judge::Member;
-pub(super) use state::inflation;
+pub(super) use state::{State, inflation};
 
 use super::catalogue::{Context, Effect};
 use super::evidence::{Evidence, Projected};
 use super::search::Candidate;
 use super::thresholds::THRESHOLDS as T;
 use rayon::prelude::*;
-use state::State;
 
 /// Verdict of a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -49,6 +49,18 @@ impl Plant {
         self.parameters().iter().map(|p| of(p.kind)).collect()
     }
 
+    /// The same tree with the values `phi` of its unknowns.
+    ///
+    /// # Panics
+    /// As [`Plant::with_values`].
+    pub(crate) fn valued(&self, phi: &[f64]) -> Plant {
+        Plant {
+            collisions: self.collisions,
+            scene: self.scene.clone(),
+            ..self.with_values(phi).into()
+        }
+    }
+
     /// The same robot with a load in the body that carries it ([`Plant::tool`]); unchanged where there is none.
     pub fn carrying(&self, load: &Inertia) -> Plant {
         let Some(tool) = self.tool() else {

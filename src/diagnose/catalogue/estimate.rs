@@ -108,6 +108,14 @@ pub struct Value {
     pub unit: &'static str,
 }
 
+impl Value {
+    /// `name = value unit`.
+    pub fn line(&self) -> String {
+        let line = format!("{} = {:.6} {}", self.name, self.value, self.unit);
+        line.trim_end().to_string()
+    }
+}
+
 /// What is measured at an actuator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {

@@ -6,6 +6,9 @@ use crate::diagnose::window::{fine_values, sampled, sign};
 /// Springs of the form with many strengths.
 const ELEMENTS: usize = 8;
 
+/// Displacement over which friction builds up that is looked at, over the range of the motion.
+const WIDEST: f64 = 0.15;
+
 /// Pre-sliding hysteresis.
 pub struct PreslidingHysteresis;
 
@@ -26,7 +29,7 @@ impl Effect for PreslidingHysteresis {
 
     fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
         let [a, b] = cx.data.range[place.first()];
-        let grid = ladder(6e-4 * (b - a), 0.15 * (b - a), 9);
+        let grid = ladder(6e-4 * (b - a), WIDEST * (b - a), 9);
         let with = |form: u8| grid.iter().map(move |s| Shape::new(form, &[*s]));
         (0..3).flat_map(with).collect()
     }
@@ -101,6 +104,23 @@ impl Effect for PreslidingHysteresis {
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
         eta[0] > 0.0
+    }
+
+    fn impossible(
+        &self,
+        cx: &Context,
+        place: &Place,
+        shape: &Shape,
+        _eta: &[f64],
+    ) -> Option<String> {
+        let [a, b] = cx.data.range[place.first()];
+        let share = shape[0] / (b - a).max(1e-9);
+        (share >= WIDEST).then(|| {
+            format!(
+                "its friction would build up over {:.0} % of the range and more: that is no pre-sliding",
+                100.0 * WIDEST
+            )
+        })
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {

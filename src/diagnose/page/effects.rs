@@ -111,7 +111,7 @@ pub(super) fn shrink(d: &Diagnosis) -> Markup {
     let mut steps: Vec<Vec<Markup>> = members()
         .map(|f| {
             vec![
-                html! { (f.title) @if !f.is_claim() { div { small { "not claimed" } } } },
+                html! { (f.title) @if !f.joints.is_empty() { " on " (f.joints.join(" and ")) } @if !f.is_claim() { div { small { "not claimed" } } } },
                 html! { (percent(f.explains)) },
                 html! { (held(f)) },
             ]

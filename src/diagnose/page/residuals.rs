@@ -49,7 +49,7 @@ pub(super) fn residuals(d: &Diagnosis) -> Markup {
         .map(|j| {
             let cell = |g: &JointGap| {
                 html! { (significant(g.rms, 3)) " " (d.units[j])
-                div { small { (percent(g.relative)) " of the torque, " (significant(g.rms / g.noise, 2)) " × noise" } } }
+                div { small { (of_torque(g)) " of the torque, " (significant(g.rms / g.noise, 2)) " × noise" } } }
             };
             vec![
                 html! { (d.joints[j]) },
@@ -81,6 +81,11 @@ pub(super) fn residuals(d: &Diagnosis) -> Markup {
             }
         }
     }
+}
+
+/// The residual over the measured torque. No limit: what is a trace above 100 % is 100 %.
+fn of_torque(g: &JointGap) -> String {
+    percent((1e3 * g.relative).round() / 1e3)
 }
 
 pub(super) fn maps(d: &Diagnosis) -> Markup {

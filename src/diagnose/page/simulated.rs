@@ -15,7 +15,7 @@ pub(super) fn simulated(d: &Diagnosis) -> Markup {
         return html! { p { "No record was simulated." } };
     };
     let colours = [Colour::GREY, Colour::BLUE, Colour::ORANGE];
-    let names = ["nominal", "refitted", "with the effects"];
+    let names = ["nominal", "refitted", "improved"];
     let step = (first.t.len() / 1500).max(1);
     let panels = worst(d, 3)
         .into_iter()
@@ -77,12 +77,16 @@ pub(super) fn simulated(d: &Diagnosis) -> Markup {
     };
     html! {
         p { "Simulated: the " (kind) ", at most " (significant(LONGEST, 2)) " s of each; rms of the deviation from \
-            the recorded position. " (driven(d)) " Effects act as the torque that they have along the recorded motion." }
-        (figure(svg, html! {
-            (legend(&[0, 1, 2].map(|m| (colours[m], Shape::Line, names[m]))))
-            "The joints with the largest share of the gap in " (first.record) "."
-        }))
-        (table(&["record", "joint", names[0], names[1], names[2], "less than refitted by"], &[0, 1], &rows))
+            the recorded position. " (driven(d)) " The improved model is that of the files, with bodies that can exist. Effects act as the torque that they have along the recorded motion." }
+        @if first.deviation.iter().any(|m| !m.is_empty()) {
+            (figure(svg, html! {
+                (legend(&[0, 1, 2].map(|m| (colours[m], Shape::Line, names[m]))))
+                "The joints with the largest share of the gap in " (first.record) "."
+            }))
+        }
+        @if f.records.iter().any(|r| r.rms.iter().any(Option::is_some)) {
+            (table(&["record", "joint", names[0], names[1], names[2], "less than refitted by"], &[0, 1], &rows))
+        }
         @for why in &f.failed { p { "Not simulated: " (why) } }
     }
 }

@@ -1,0 +1,376 @@
+//! Friction that the robot file does not hold.
+//!
+//! A file from CAD often states no friction at all, and every machine has some in every joint. The effects of the catalogue
+//! are told apart beside a model with friction; without it the first of them takes what it can of the friction of all joints.
+//! So viscous and Coulomb friction and an offset of every joint are fitted with the nominal model first,
+//!
+//! ```text
+//! τ = W (φ₀ + δ) + Σ_j (F_v q̇ + F_c sgn q̇ + o)_j + ε        δ ~ N(0, P),  F_v, F_c > 0
+//! ```
+//!
+//! with nothing known of their size. Those that stand out of their own deviation are taken into the nominal model, and the
+//! effects are looked for beside them. Each is a finding: its share is what comes back when the friction of its joint is taken out of
+//! a fit of all of them, of the gap that the refit without any leaves. Where the speeds do not tell viscous from Coulomb friction of a
+//! joint, the better known of the two is named, and that it is not told from the other.
+
+use super::catalogue::{Context, Effect, Place, Shape, Value, in_mujoco};
+use super::channel::Assumed;
+use super::data::Data;
+use super::evidence::{Evidence, Projected};
+use super::finding::{Finding, estimate, names};
+use super::improve::Improved;
+use super::payload::Loads;
+use super::thresholds::THRESHOLDS as T;
+use super::verdict::{State, Verdict, inflation};
+use super::{gathered, interval};
+use crate::error::{Result, Warning, WarningKind};
+use crate::export::{Part, Remark};
+use crate::log;
+use crate::plant::{self, Plant};
+use crate::robot::{Joint, JointTerm, Robot};
+
+/// What is fitted where nothing is stated, and the effect that it is.
+const TERMS: [(JointTerm, &str); 3] = [
+    (JointTerm::Viscous, "viscous_friction"),
+    (JointTerm::Coulomb, "coulomb_friction"),
+    (JointTerm::Offset, "torque_offset"),
+];
+
+/// Whether an effect is one of those that are fitted where nothing is stated.
+pub fn is_term(effect: &str) -> bool {
+    TERMS.iter().any(|t| t.1 == effect)
+}
+
+/// The parameter of a term of an actuator, and the name of its effect.
+struct Own {
+    /// place among the parameters
+    at: usize,
+    actuator: usize,
+    term: JointTerm,
+    effect: &'static str,
+}
+
+/// The terms of all actuators among the parameters of a model.
+fn terms(plant: &Plant) -> Vec<Own> {
+    let actuated = plant.actuated();
+    let of = |(at, p): (usize, &plant::Parameter)| match p.kind {
+        plant::Column::Term { joint, term } => Some(Own {
+            at,
+            actuator: actuated.iter().position(|a| *a == joint)?,
+            term,
+            effect: TERMS.iter().find(|t| t.0 == term)?.1,
+        }),
+        _ => None,
+    };
+    let all = plant.parameters().iter().enumerate();
+    all.filter_map(of).collect()
+}
+
+/// Whether a file of a tree states no friction of any joint, and none to be fitted.
+fn states_none(plant: &Plant) -> bool {
+    let unknown = |j: &&Joint| j.identify.contains(&true);
+    !plant.closed() && frictionless(plant.robot()) && !plant.actuators().iter().any(unknown)
+}
+
+/// Whether no joint of a robot has friction.
+fn frictionless(robot: &Robot) -> bool {
+    let of = |j: &Joint| [JointTerm::Viscous, JointTerm::Coulomb].map(|t| j.terms[t as usize]);
+    robot.joints.iter().all(|j| of(j) == [0.0; 2])
+}
+
+/// The robot with the friction that its records show, where its file states none; `None` where it does, or they show none.
+///
+/// # Errors
+/// Poses that cannot be reached.
+pub fn with_friction(plant: &Plant, logs: &[log::Record]) -> Result<Option<Plant>> {
+    if !states_none(plant) {
+        return Ok(None);
+    }
+    let open = plant.clone().with_terms(&TERMS.map(|t| t.0));
+    let mut data = gathered(&open, logs, Loads::One)?.completed(Assumed::default())?;
+    let terms = terms(&open);
+    for own in &terms {
+        let speed = match own.term {
+            JointTerm::Viscous => data.speed[own.actuator],
+            _ => 1.0,
+        };
+        data.spread[own.at] = data.torque_rms(own.actuator) / speed;
+    }
+    // one of a joint at a time is left out: what one takes makes others less known
+    loop {
+        let (phi, known) = fitted(&data, &terms);
+        let mut out: Vec<usize> = Vec::new();
+        for j in 0..data.joints() {
+            let of = (0..terms.len()).filter(|i| terms[*i].actuator == j);
+            let kept = of.filter(|i| data.spread[terms[*i].at] > 0.0);
+            let least = kept.min_by(|a, b| known[*a].total_cmp(&known[*b]));
+            out.extend(least.filter(|i| known[*i] < T.confidence.body.centre));
+        }
+        if out.is_empty() {
+            let shown = terms.iter().any(|own| data.spread[own.at] > 0.0);
+            return Ok(shown.then(|| open.valued(&stated(&open, &terms, &data, &phi))));
+        }
+        out.iter().for_each(|i| data.spread[terms[*i].at] = 0.0);
+    }
+}
+
+/// Parameters of the refit, and by how many of its deviations each of the terms stands out: friction brakes, so what is negative of
+/// it does not.
+fn fitted(data: &Data, terms: &[Own]) -> (Vec<f64>, Vec<f64>) {
+    let evidence = Evidence::new(data, 1.0);
+    let fit = evidence.fit(&[]);
+    let phi = evidence.parameters(&[], &fit);
+    let scale = inflation(&evidence.residual(&[], &fit), data.fitted);
+    let known = |own: &Own| {
+        let value = match own.term {
+            JointTerm::Offset => phi[own.at].abs(),
+            _ => phi[own.at],
+        };
+        value / (scale * evidence.std(own.at)).max(f64::MIN_POSITIVE)
+    };
+    let known = terms.iter().map(known).collect();
+    (phi, known)
+}
+
+/// The values of the file, with those terms that were fitted.
+fn stated(plant: &Plant, terms: &[Own], data: &Data, phi: &[f64]) -> Vec<f64> {
+    let mut values: Vec<f64> = plant.parameters().iter().map(|p| p.value).collect();
+    let kept = terms.iter().filter(|own| data.spread[own.at] > 0.0);
+    kept.for_each(|own| values[own.at] = phi[own.at]);
+    values
+}
+
+/// What a search beside friction that the file does not hold has found.
+pub struct Beyond<'a> {
+    /// the nominal model with that friction
+    pub evidence: &'a Evidence<'a>,
+    /// what columns are made from
+    pub cx: &'a Context<'a>,
+    /// the catalogue
+    pub effects: &'a [Box<dyn Effect>],
+    /// whitened residuals of the refit with the friction alone, and with all that was found
+    pub left: [&'a [Vec<f64>]; 2],
+    /// parameters with all that was found
+    pub phi: &'a [f64],
+    /// seed of the intervals
+    pub seed: u64,
+}
+
+/// The gap and its explanation, counted from the file without friction.
+pub struct Lacked {
+    /// parameters of the file, with zeros for what was fitted later
+    pub nominal: Vec<f64>,
+    /// parameters of a refit without friction
+    pub refit: Vec<f64>,
+    /// whitened residuals of the nominal model and of that refit
+    pub residuals: [Vec<Vec<f64>>; 2],
+    /// the friction of each joint
+    pub findings: Vec<Finding>,
+    /// gap on holdout records without any of it, and with all that was found; zero where they show none
+    pub holdout: [f64; 2],
+    /// share of the gap that stays on fitted records
+    pub unexplained: f64,
+    /// share of the gap that the friction leaves to other effects, on fitted records and on those held out
+    pub others: [f64; 2],
+}
+
+impl Beyond<'_> {
+    /// Counts the gap from the robot file `plant`.
+    pub fn lacked(&self, plant: &Plant) -> Lacked {
+        let data = self.evidence.data;
+        let terms = terms(data.plant);
+        let actuators = plant.actuators();
+        let mut bare = data.clone();
+        for own in &terms {
+            bare.parameters[own.at].value = actuators[own.actuator].terms[own.term as usize];
+            bare.spread[own.at] = 0.0;
+        }
+        let evidence = Evidence::new(&bare, 1.0);
+        let st = State::new(&evidence, self.cx, self.effects);
+        let (none, residual) = st.fit(&[]);
+        let gaps = |e: &[Vec<f64>]| [true, false].map(|fit| st.gap(e, fit));
+        let [before, held] = gaps(&residual);
+        let above = |[fit, held]: [Vec<f64>; 2]| [st.above(&fit, true), st.above(&held, false)];
+        let whole = above([before.clone(), held.clone()]);
+        let [with_friction, with_all] = self.left.map(|e| above(gaps(e)));
+        let share = |part: f64, of: f64| (part / of.max(1e-9)).clamp(0.0, 1.0);
+        let shows = st.shows_held(whole[1]);
+        Lacked {
+            nominal: evidence.phi.clone(),
+            refit: evidence.parameters(&[], &none),
+            findings: self.findings(&st, &terms, &residual, [&before, &held]),
+            holdout: match shows {
+                true => [whole[1], with_all[1]],
+                false => [0.0; 2],
+            },
+            unexplained: share(with_all[0], whole[0]),
+            others: [0, 1].map(|i| share(with_friction[i], whole[i])),
+            residuals: [evidence.r.clone(), residual],
+        }
+    }
+
+    /// A finding for each term that was fitted: shares from a fit of all of them beside the file, values from the fit of all that
+    /// was found.
+    fn findings(
+        &self,
+        st: &State,
+        terms: &[Own],
+        none: &[Vec<f64>],
+        [before, held]: [&[f64]; 2],
+    ) -> Vec<Finding> {
+        let (data, evidence) = (self.evidence.data, st.evidence);
+        let named = |own: &Own| self.effects.iter().find(|e| e.card().name == own.effect);
+        let shown = terms.iter().filter(|own| data.parameters[own.at].value != 0.0);
+        let all: Vec<(&Own, &dyn Effect)> = shown
+            .filter_map(|own| Some((own, named(own)?.as_ref())))
+            .collect();
+        let place = |own: &Own| Place::Actuator(own.actuator);
+        let columns = |(own, effect): &(&Own, &dyn Effect)| {
+            effect.columns(self.cx, &place(own), &Shape::default(), false)
+        };
+        let sets: Vec<_> = all.iter().map(columns).collect();
+        let projected = evidence.project_all(&sets);
+        let left = |kept: &dyn Fn(&Own) -> bool| {
+            let kept = all.iter().zip(&projected).filter(|((own, _), _)| kept(own));
+            let set: Vec<&Projected> = kept.map(|(_, p)| p).collect();
+            evidence.residual(&set, &evidence.fit(&set))
+        };
+        let with = left(&|_| true);
+        let gaps = |e: &[Vec<f64>]| [true, false].map(|fit| st.gap(e, fit));
+        let after = gaps(&with);
+        let counted = |e: &[Vec<f64>]| evidence.as_counted(e);
+        let (total, with) = (counted(none), counted(&with));
+        let shows = st.shows_held(st.above(held, false));
+        let scale = inflation(self.left[1], data.fitted);
+        // viscous and Coulomb friction of a joint share what both explain; an offset stands for itself
+        let alike = |a: &Own, b: &Own| {
+            let offset = |own: &Own| own.term == JointTerm::Offset;
+            a.actuator == b.actuator && offset(a) == offset(b)
+        };
+        let mut out: Vec<Finding> = Vec::new();
+        for (i, (own, effect)) in all.iter().enumerate() {
+            let without = left(&|other| !alike(own, other));
+            let gap = gaps(&without);
+            // of the gap of its joint, fitted and held out
+            let [fit, kept] = [0, 1].map(|k| {
+                let (w, a) = (gap[k][own.actuator], after[k][own.actuator]);
+                (w - a) / [before, held][k][own.actuator].max(1e-9)
+            });
+            let repeats = match shows && held[own.actuator] > 0.0 {
+                true => T.confidence.repeats.above(kept / fit.max(1e-9)),
+                false => 1.0,
+            };
+            let known = |own: &Own| {
+                let std = scale * self.evidence.std(own.at);
+                let known = self.phi[own.at].abs() / std.max(f64::MIN_POSITIVE);
+                (known, std)
+            };
+            let (value, (sure, std)) = (self.phi[own.at], known(own));
+            let together = T.matters.of_joints.above(fit) * repeats;
+            // that there is friction is known before which of the two it is
+            let others: Vec<&Own> = (all.iter().map(|a| a.0))
+                .filter(|other| other.at != own.at && alike(own, other))
+                .collect();
+            let first = others.iter().all(|other| known(other).0 < sure);
+            let alone = T.confidence.body.above(sure);
+            let told = alone >= T.confidence.claim;
+            let explains = st.explains(&gap[0], &after[0]).clamp(0.0, 1.0);
+            let card = effect.card();
+            let fitted = estimate(place(own), &Shape::default(), &[value], &[std]);
+            let above = |e: &[f64]| st.above(e, false);
+            out.push(Finding {
+                effect: card.name,
+                title: card.title,
+                equation: card.equation,
+                separated_by: card.separated_by,
+                joints: names(self.cx, &place(own)),
+                place: place(own),
+                shape: Shape::default(),
+                records: Vec::new(),
+                eta: vec![value],
+                confidence: match first && !told && !others.is_empty() {
+                    true => together,
+                    false => alone * together,
+                },
+                explains,
+                interval: interval::explained(
+                    data,
+                    &total,
+                    &counted(&without),
+                    &with,
+                    explains,
+                    self.seed,
+                ),
+                holdout: shows.then(|| {
+                    let gone = above(&gap[1]) - above(&after[1]);
+                    (gone / above(held).max(1e-9)).clamp(-1.0, 1.0)
+                }),
+                visibility: projected[i].visibility(None),
+                decoys: None,
+                unsteady: None,
+                values: effect.values(self.cx, &fitted),
+                mujoco: in_mujoco(self.cx, *effect, &fitted),
+                same: match told {
+                    true => Vec::new(),
+                    false => others.iter().map(|other| other.effect).collect(),
+                },
+                member: true,
+                frozen: false,
+            });
+        }
+        out.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        out
+    }
+}
+
+impl Lacked {
+    /// Says in an improved model that it holds the friction.
+    pub fn remark(&self, plant: &Plant, improved: &mut Improved) {
+        let claimed = self.findings.iter().filter(|f| f.is_claim());
+        let remark = |f: &Finding| {
+            let term = TERMS.iter().find(|t| t.1 == f.effect)?.0;
+            Some(Remark {
+                effect: f.effect,
+                place: f.joints.join(", "),
+                equation: f.equation,
+                values: f.values.iter().map(Value::line).collect(),
+                held: Some(Part::Term(term)),
+                element: None,
+            })
+        };
+        // a model that was left as it is in the file has none
+        if frictionless(&improved.robot) {
+            return;
+        }
+        let all: Vec<Remark> = claimed.filter_map(remark).collect();
+        let files = all.iter().map(|r| r.in_files(plant));
+        improved.in_mujoco.splice(0..0, files);
+        improved.remarks.splice(0..0, all);
+    }
+
+    /// The verdict with the friction, from that of the search beside it, and the findings of both.
+    pub fn told(&self, verdict: Verdict, findings: &mut Vec<Finding>) -> Verdict {
+        for f in findings.iter_mut() {
+            f.explains *= self.others[0];
+            f.interval = f.interval.map(|v| v * self.others[0]);
+            f.holdout = f.holdout.map(|h| h * self.others[1]);
+        }
+        let claimed = self.findings.iter().any(Finding::is_claim);
+        findings.splice(0..0, self.findings.iter().cloned());
+        match verdict {
+            Verdict::NoGap if claimed => Verdict::Explained,
+            Verdict::Unknown if claimed => Verdict::PartlyExplained,
+            other => other,
+        }
+    }
+}
+
+/// What the report says of it.
+pub fn warning(plant: &Plant) -> Warning {
+    Warning::new(
+        WarningKind::JointTermsAssumed,
+        plant.name(),
+        "its file states no friction; viscous and Coulomb friction and an offset of each joint were fitted with its model \
+         first, and other effects were looked for beside them",
+    )
+}
