@@ -86,7 +86,12 @@ pub fn with_friction(plant: &Plant, logs: &[log::Record]) -> Result<Option<Plant
     if !states_none(plant) {
         return Ok(None);
     }
-    let open = plant.clone().with_terms(&TERMS.map(|t| t.0));
+    // a rotor that the file states is as well known as its bodies
+    let rotor = |j: &Joint| j.terms[JointTerm::Armature as usize] != 0.0;
+    let rotors = plant.robot().joints.iter().any(rotor);
+    let mut free = TERMS.map(|t| t.0).to_vec();
+    free.extend(rotors.then_some(JointTerm::Armature));
+    let open = plant.clone().with_terms(&free);
     let mut data = gathered(&open, logs, Loads::One)?.completed(Assumed::default())?;
     let terms = terms(&open);
     for own in &terms {
@@ -220,7 +225,9 @@ impl Beyond<'_> {
     ) -> Vec<Finding> {
         let (data, evidence) = (self.evidence.data, st.evidence);
         let named = |own: &Own| self.effects.iter().find(|e| e.card().name == own.effect);
-        let shown = terms.iter().filter(|own| data.parameters[own.at].value != 0.0);
+        let shown = terms
+            .iter()
+            .filter(|own| data.parameters[own.at].value != 0.0);
         let all: Vec<(&Own, &dyn Effect)> = shown
             .filter_map(|own| Some((own, named(own)?.as_ref())))
             .collect();

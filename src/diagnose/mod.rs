@@ -345,11 +345,7 @@ fn of_plant<'a>(
         at_rest,
         second_encoder,
         stands_out: decision.stands_out || much,
-        unexplained: if data.moves() {
-            unexplained
-        } else {
-            1.0
-        },
+        unexplained: if data.moves() { unexplained } else { 1.0 },
         traces: traces::traces(data, &refit, &after),
         noise_source: result::noise_source(data),
         untestable: result::untestable(data, &list, &effects),

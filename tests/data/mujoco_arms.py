@@ -37,6 +37,8 @@ EFFECTS = [
     "stribeck_friction and torque_delay",
     "cogging and payload",
 ]
+#: what every arm has, and a bare file lacks
+FRICTION = ["viscous_friction", "coulomb_friction", "torque_offset"]
 #: name, seed, period (s), periods, share of the top speed
 RECORDS = [("fit_1", 1, 8.0, 2, 0.9), ("fit_2", 2, 12.0, 2, 0.36), ("fit_3", 3, 10.0, 2, 0.63), ("holdout", 4, 8.0, 1, 0.77)]
 #: length of a link (m), mass of the first (kg), top speed (rad/s), joints
@@ -224,19 +226,21 @@ class Machine:
         tau = tau[::every] + self.noise * rng.normal(size=tau[::every].shape)
         return np.c_[t[::every], np.round(q[::every] / step) * step, tau]
 
-    def file(self):
-        return mjcf(self.nominal, self.nominal_friction, 6 * self.scale)
+    def file(self, bare=False):
+        rotor, viscous, coulomb = self.nominal_friction
+        friction = [rotor, 0.0 * viscous, 0.0 * coulomb] if bare else self.nominal_friction
+        return mjcf(self.nominal, friction, 6 * self.scale)
 
-    def write(self, folder):
+    def write(self, folder, bare=False):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "arm.xml").write_text(self.file())
+        (folder / "arm.xml").write_text(self.file(bare))
         robot = f'name = "arm"\nurdf = "arm.xml"\nprior = "{"identified" if self.close else "cad"}"\n'
         for j in range(self.n):
             robot += (
                 f'[[joint]]\nname = "joint{j + 1}"\ntorque_noise = {float(self.noise[j])!r}\nvelocity = {1.5 * self.top}\n'
                 f'position_resolution = {2 * np.pi / 2**self.bits!r}\nacceleration = 50.0\n'
-                'identify = ["armature", "viscous", "coulomb", "offset"]\n'
             )
+            robot += "" if bare else 'identify = ["armature", "viscous", "coulomb", "offset"]\n'
             robot += f"gear_ratio = {GEAR}\n" if "cogging" in self.effect else ""
         (folder / "robot.toml").write_text(robot)
         experiment = 'robot = "robot.toml"\n'
@@ -261,13 +265,14 @@ def case(job):
     """What was named on one arm."""
     number, options = job
     machine, folder = Machine(options.seed, number, options.hobby), options.output / f"arm_{number:03d}"
-    machine.write(folder)
+    machine.write(folder, options.bare)
     told = [options.excite, "diagnose", folder / "experiment.toml", "--no-next", "--force", "--output", folder / "gap"]
     done = subprocess.run(told, capture_output=True, text=True, check=False)
     if done.returncode:
         return number, machine, "failed: " + done.stderr.strip(), []
     found = json.loads((folder / "gap/diagnosis.json").read_text())
-    claims = [f for f in found["findings"] if f["confidence"] >= options.claim]
+    known = FRICTION if options.bare else []
+    claims = [f for f in found["findings"] if f["confidence"] >= options.claim and f["effect"] not in known]
     return number, machine, found["verdict"], [(f["effect"], f["joints"], f["confidence"]) for f in claims]
 
 
@@ -278,6 +283,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of the arms that are made, instead of all")
     parser.add_argument("--hobby", action="store_true", help="hobby arms alone: 12 bits, 500 Hz, torques at an instant")
+    parser.add_argument("--bare", action="store_true", help="files that state no friction; the names of all friction are passed over")
     parser.add_argument("--claim", type=float, default=0.5, help="least confidence of a name that counts")
     parser.add_argument("--output", type=Path, default=Path("target/mujoco_arms"))
     options = parser.parse_args()

@@ -30,7 +30,7 @@ const MOTIONS: [(f64, bool, bool); 4] = [
 ];
 
 /// A robot of two joints with friction; the model and a machine that differs in the ordinary way.
-fn robots() -> (Plant, excite::Robot) {
+pub(super) fn robots() -> (Plant, excite::Robot) {
     let mut model = excite::Robot::load("planar2")
         .expect("a bundled robot")
         .with_terms(&JointTerm::ALL);
@@ -123,7 +123,7 @@ fn logs(extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64) -> Vec<Re
 }
 
 /// Logs of four motions, each of a machine of its own; the last is not fitted to.
-fn logs_of(
+pub(super) fn logs_of(
     machines: [&excite::Robot; 4],
     extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64,
 ) -> Vec<Record> {
@@ -151,7 +151,7 @@ fn run(extra: &mut dyn FnMut(usize, f64, &[f64], &[f64], f64) -> f64) -> Diagnos
     diagnosed(&logs(extra))
 }
 
-fn claims(d: &Diagnosis) -> Vec<(&str, Vec<usize>)> {
+pub(super) fn claims(d: &Diagnosis) -> Vec<(&str, Vec<usize>)> {
     d.findings
         .iter()
         .filter(|f| f.confidence >= 0.5)
@@ -865,7 +865,7 @@ fn a_record_in_memory_is_not_read_again() {
     assert!((after - before - 3.0).abs() < 1e-9, "{before} {after}");
 }
 
-fn of_folder(folder: &str) -> Option<Diagnosis> {
+pub(super) fn of_folder(folder: &str) -> Option<Diagnosis> {
     let path = shared(folder)?;
     let experiment = Experiment::read(path.join("experiment.toml")).expect("an experiment");
     let settings = Settings::default().with(|set| set.next = false);

@@ -6,6 +6,7 @@ mod common;
 mod coarse;
 mod controller;
 mod findings;
+mod friction;
 mod next;
 mod parallel;
 mod poses;
