@@ -52,6 +52,9 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
             nominal model cannot absorb by other parameters; " strong { "decoys" } " the most that the effect explains of its own when it \
             is moved in time, over what it explains in place: near 100 % it is as good as any signal; " strong { "unsteady" } " \
             what coefficients of their own for every record would add to that, near 0 % where it is the same in all." }
+        @if d.friction_found {
+            p { "The robot file states no friction. Viscous and Coulomb friction of a joint have one share, which is that of both." }
+        }
         (table(&head, &[1, 7], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
         @if !rest.is_empty() {
             (details("Rivals: what else could stand in their place", table(&head, &[1, 7],
