@@ -45,6 +45,12 @@ impl Data<'_> {
     }
 }
 
+/// Whether friction that a robot file does not state is fitted first: of trees, whose joints all have a motor. The file of a closed chain
+/// says which of its joints have any.
+pub fn may_lack_friction(plant: &Plant) -> bool {
+    !closed(plant)
+}
+
 /// Whether the links of legs have common axes, so that parameters of one stand for those of all: not of general closed
 /// chains.
 pub fn legs_alike(plant: &Plant) -> bool {

@@ -14,6 +14,7 @@
 //! joint, the better known of the two is named, and that it is not told from the other.
 
 use super::catalogue::{Context, Effect, Place, Shape, Value, in_mujoco};
+use super::chain;
 use super::channel::Assumed;
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
@@ -69,7 +70,9 @@ fn terms(plant: &Plant) -> Vec<Own> {
 /// Whether a file of a tree states no friction of any joint, and none to be fitted.
 fn states_none(plant: &Plant) -> bool {
     let unknown = |j: &&Joint| j.identify.contains(&true);
-    !plant.closed() && frictionless(plant.robot()) && !plant.actuators().iter().any(unknown)
+    chain::may_lack_friction(plant)
+        && frictionless(plant.robot())
+        && !plant.actuators().iter().any(unknown)
 }
 
 /// Whether no joint of a robot has friction.
