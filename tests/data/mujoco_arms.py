@@ -227,8 +227,8 @@ class Machine:
         return np.c_[t[::every], np.round(q[::every] / step) * step, tau]
 
     def file(self, bare=False):
-        rotor, viscous, coulomb = self.nominal_friction
-        friction = [rotor, 0.0 * viscous, 0.0 * coulomb] if bare else self.nominal_friction
+        coulomb, viscous, rotor = self.nominal_friction
+        friction = [0.0 * coulomb, 0.0 * viscous, rotor] if bare else self.nominal_friction
         return mjcf(self.nominal, friction, 6 * self.scale)
 
     def write(self, folder, bare=False):
