@@ -62,6 +62,34 @@ impl Finding {
     pub fn is_claim(&self) -> bool {
         self.member && self.confidence >= T.confidence.claim
     }
+
+    /// An effect as it was estimated, a member of the set of which nothing else is known yet.
+    pub(super) fn of(cx: &Context, effect: &dyn Effect, estimated: Estimate) -> Self {
+        let card = effect.card();
+        Finding {
+            effect: card.name,
+            title: card.title,
+            equation: card.equation,
+            separated_by: card.separated_by,
+            joints: names(cx, &estimated.place),
+            records: Vec::new(),
+            confidence: 0.0,
+            explains: 0.0,
+            interval: [0.0, 1.0],
+            holdout: None,
+            visibility: 1.0,
+            decoys: None,
+            unsteady: None,
+            values: effect.values(cx, &estimated),
+            same: Vec::new(),
+            mujoco: in_mujoco(cx, effect, &estimated),
+            member: true,
+            frozen: false,
+            place: estimated.place,
+            shape: estimated.shape,
+            eta: estimated.eta,
+        }
+    }
 }
 
 /// Members and rivals of a decision, by falling confidence; `seed` is that of the intervals.
@@ -127,16 +155,8 @@ fn members(
                 same.push(rival);
             }
         }
+        let estimated = estimate(c.place, &c.shape, &c.eta, &m.std);
         findings.push(Finding {
-            effect: card.name,
-            title: card.title,
-            equation: card.equation,
-            separated_by: card.separated_by,
-            joints: names(cx, &c.place),
-            place: c.place,
-            shape: c.shape.clone(),
-            records: Vec::new(),
-            eta: c.eta.clone(),
             confidence: m.confidence,
             explains: m.explains,
             interval,
@@ -144,11 +164,9 @@ fn members(
             visibility: m.visibility,
             decoys: m.decoys,
             unsteady: m.unsteady,
-            values: effect.values(cx, &estimate(c.place, &c.shape, &c.eta, &m.std)),
-            mujoco: in_mujoco(cx, effect, &estimate(c.place, &c.shape, &c.eta, &m.std)),
             same,
-            member: true,
             frozen: m.frozen,
+            ..Finding::of(cx, effect, estimated)
         });
     }
     findings
@@ -177,24 +195,11 @@ fn rivals(
             let of_rival = estimate(r.place, &r.shape, &r.eta, &vec![0.0; r.eta.len()]);
             let main = &findings[m];
             findings.push(Finding {
-                effect: card.name,
-                title: card.title,
-                equation: card.equation,
-                separated_by: card.separated_by,
-                joints: names(cx, &r.place),
-                place: r.place,
-                shape: r.shape.clone(),
-                records: Vec::new(),
-                eta: r.eta.clone(),
                 confidence: (main.confidence * r.weight).min(T.rivals.believed),
                 explains: main.explains * (1.0 - r.loss).clamp(0.0, 1.0),
                 interval: main.interval.map(|v| v * (1.0 - r.loss).clamp(0.0, 1.0)),
                 holdout: main.holdout.map(|h| h * (1.0 - r.loss).clamp(0.0, 1.0)),
                 visibility: of.visibility,
-                decoys: None,
-                unsteady: None,
-                values: effect.values(cx, &of_rival),
-                mujoco: in_mujoco(cx, effect, &of_rival),
                 same: if r.weight > T.rivals.same {
                     vec![main.effect]
                 } else {
@@ -202,6 +207,7 @@ fn rivals(
                 },
                 member: false,
                 frozen: main.frozen,
+                ..Finding::of(cx, effect, of_rival)
             });
         }
     }
@@ -232,7 +238,6 @@ fn one_load(
 ) -> Option<Finding> {
     let data = evidence.data;
     let effect = effects.iter().find(|e| e.card().name == "payload")?;
-    let card = effect.card();
     let place = *effect.sites(cx).first()?;
     let eta = phi.get(at..at + 10)?.to_vec();
     let scale = super::verdict::inflation(&evidence.residual(&[], &evidence.fit(&[])), data.fitted);
@@ -240,7 +245,6 @@ fn one_load(
     // a load without weight is none
     let shape = effect.shapes(cx, &place).pop()?;
     let load_of = estimate(place, &shape, &eta, &std);
-    let values = effect.values(cx, &load_of);
     let mut of: Vec<(usize, String)> = data
         .records
         .iter()
@@ -250,26 +254,12 @@ fn one_load(
         .collect();
     of.sort();
     Some(Finding {
-        effect: card.name,
-        title: card.title,
-        equation: card.equation,
-        separated_by: card.separated_by,
-        joints: names(cx, &place),
-        place,
-        shape,
         records: of.into_iter().map(|r| r.1).collect(),
-        eta,
         confidence: load.confidence,
         explains: load.explains,
-        interval: [0.0, 1.0],
-        holdout: None,
-        visibility: 1.0,
         decoys: Some(load.decoys),
         unsteady: Some(load.unsteady),
-        values,
-        mujoco: in_mujoco(cx, effect.as_ref(), &load_of),
-        same: Vec::new(),
-        member: true,
         frozen: true,
+        ..Finding::of(cx, effect.as_ref(), load_of)
     })
 }

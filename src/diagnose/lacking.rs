@@ -13,12 +13,12 @@
 //! a fit of all of them, of the gap that the refit without any leaves. Where the speeds do not tell viscous from Coulomb friction of a
 //! joint, the better known of the two is named, and that it is not told from the other.
 
-use super::catalogue::{Context, Effect, Place, Shape, Value, in_mujoco};
+use super::catalogue::{Context, Effect, Place, Shape, Value};
 use super::chain;
 use super::channel::Assumed;
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
-use super::finding::{Finding, estimate, names};
+use super::finding::{Finding, estimate};
 use super::improve::Improved;
 use super::payload::Loads;
 use super::thresholds::THRESHOLDS as T;
@@ -49,6 +49,30 @@ struct Own {
     actuator: usize,
     term: JointTerm,
     effect: &'static str,
+}
+
+impl Own {
+    fn place(&self) -> Place {
+        Place::Actuator(self.actuator)
+    }
+
+    /// Whether another one stands for the same: viscous and Coulomb friction of a joint share what both explain, an offset stands for
+    /// itself.
+    fn shares(&self, other: &Own) -> bool {
+        let offset = |own: &Own| own.term == JointTerm::Offset;
+        self.actuator == other.actuator && offset(self) == offset(other)
+    }
+}
+
+/// What goes with terms of a joint that share it.
+struct Taken {
+    /// 0 to 1: that any of them is there
+    confidence: f64,
+    /// share of the gap on fitted records, and its 95 % interval
+    explains: f64,
+    interval: [f64; 2],
+    /// share on holdout records, where these show a gap
+    holdout: Option<f64>,
 }
 
 /// The terms of all actuators among the parameters of a model.
@@ -234,9 +258,8 @@ impl Beyond<'_> {
         let all: Vec<(&Own, &dyn Effect)> = shown
             .filter_map(|own| Some((own, named(own)?.as_ref())))
             .collect();
-        let place = |own: &Own| Place::Actuator(own.actuator);
         let columns = |(own, effect): &(&Own, &dyn Effect)| {
-            effect.columns(self.cx, &place(own), &Shape::default(), false)
+            effect.columns(self.cx, &own.place(), &Shape::default(), false)
         };
         let sets: Vec<_> = all.iter().map(columns).collect();
         let projected = evidence.project_all(&sets);
@@ -251,81 +274,71 @@ impl Beyond<'_> {
         let counted = |e: &[Vec<f64>]| evidence.as_counted(e);
         let (total, with) = (counted(none), counted(&with));
         let shows = st.shows_held(st.above(held, false));
-        let scale = inflation(self.left[1], data.fitted);
-        // viscous and Coulomb friction of a joint share what both explain; an offset stands for itself
-        let alike = |a: &Own, b: &Own| {
-            let offset = |own: &Own| own.term == JointTerm::Offset;
-            a.actuator == b.actuator && offset(a) == offset(b)
-        };
-        let mut out: Vec<Finding> = Vec::new();
-        for (i, (own, effect)) in all.iter().enumerate() {
-            let without = left(&|other| !alike(own, other));
+        // what goes with terms that share it
+        let taken = |of: &Own| {
+            let without = left(&|other| !of.shares(other));
             let gap = gaps(&without);
-            // of the gap of its joint, fitted and held out
+            let j = of.actuator;
             let [fit, kept] = [0, 1].map(|k| {
-                let (w, a) = (gap[k][own.actuator], after[k][own.actuator]);
-                (w - a) / [before, held][k][own.actuator].max(1e-9)
+                let gone = gap[k][j] - after[k][j];
+                gone / [before, held][k][j].max(1e-9)
             });
-            let repeats = match shows && held[own.actuator] > 0.0 {
+            let repeats = match shows && held[j] > 0.0 {
                 true => T.confidence.repeats.above(kept / fit.max(1e-9)),
                 false => 1.0,
             };
-            let known = |own: &Own| {
-                let std = scale * self.evidence.std(own.at);
-                let known = self.phi[own.at].abs() / std.max(f64::MIN_POSITIVE);
-                (known, std)
+            let explains = st.explains(&gap[0], &after[0]).clamp(0.0, 1.0);
+            let without = counted(&without);
+            Taken {
+                confidence: T.matters.of_joints.above(fit) * repeats,
+                explains,
+                interval: interval::explained(data, &total, &without, &with, explains, self.seed),
+                holdout: shows.then(|| {
+                    let gone = st.above(&gap[1], false) - st.above(&after[1], false);
+                    (gone / st.above(held, false).max(1e-9)).clamp(-1.0, 1.0)
+                }),
+            }
+        };
+        let scale = inflation(self.left[1], data.fitted);
+        let std = |own: &Own| scale * self.evidence.std(own.at);
+        let known = |own: &Own| self.phi[own.at].abs() / std(own).max(f64::MIN_POSITIVE);
+        let mut shared: Vec<(&Own, Taken)> = Vec::new();
+        let mut out: Vec<Finding> = Vec::new();
+        for ((own, effect), projected) in all.iter().zip(&projected) {
+            if !shared.iter().any(|(of, _)| of.shares(own)) {
+                shared.push((own, taken(own)));
+            }
+            let Some((_, taken)) = shared.iter().find(|(of, _)| of.shares(own)) else {
+                continue;
             };
-            let (value, (sure, std)) = (self.phi[own.at], known(own));
-            let together = T.matters.of_joints.above(fit) * repeats;
-            // that there is friction is known before which of the two it is
             let others: Vec<&Own> = (all.iter().map(|a| a.0))
-                .filter(|other| other.at != own.at && alike(own, other))
+                .filter(|other| other.at != own.at && own.shares(other))
                 .collect();
-            let first = others.iter().all(|other| known(other).0 < sure);
+            // that there is friction is known before which of the two it is
+            let sure = known(own);
+            let first = others.iter().all(|other| known(other) < sure);
             let alone = T.confidence.body.above(sure);
             let told = alone >= T.confidence.claim;
-            let explains = st.explains(&gap[0], &after[0]).clamp(0.0, 1.0);
-            let card = effect.card();
-            let fitted = estimate(place(own), &Shape::default(), &[value], &[std]);
-            let above = |e: &[f64]| st.above(e, false);
+            let fitted = estimate(
+                own.place(),
+                &Shape::default(),
+                &[self.phi[own.at]],
+                &[std(own)],
+            );
             out.push(Finding {
-                effect: card.name,
-                title: card.title,
-                equation: card.equation,
-                separated_by: card.separated_by,
-                joints: names(self.cx, &place(own)),
-                place: place(own),
-                shape: Shape::default(),
-                records: Vec::new(),
-                eta: vec![value],
                 confidence: match first && !told && !others.is_empty() {
-                    true => together,
-                    false => alone * together,
+                    true => taken.confidence,
+                    false => alone * taken.confidence,
                 },
-                explains,
-                interval: interval::explained(
-                    data,
-                    &total,
-                    &counted(&without),
-                    &with,
-                    explains,
-                    self.seed,
-                ),
-                holdout: shows.then(|| {
-                    let gone = above(&gap[1]) - above(&after[1]);
-                    (gone / above(held).max(1e-9)).clamp(-1.0, 1.0)
-                }),
-                visibility: projected[i].visibility(None),
-                decoys: None,
-                unsteady: None,
-                values: effect.values(self.cx, &fitted),
-                mujoco: in_mujoco(self.cx, *effect, &fitted),
+                explains: taken.explains,
+                interval: taken.interval,
+                holdout: taken.holdout,
+                visibility: projected.visibility(None),
                 same: match told {
                     true => Vec::new(),
                     false => others.iter().map(|other| other.effect).collect(),
                 },
-                member: true,
-                frozen: false,
+                ..Finding::of(self.cx, *effect, fitted)
             });
         }
         out.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
