@@ -22,7 +22,8 @@ use super::data::Data;
 use super::evidence::Evidence;
 use super::prior::{Closeness, factors};
 use super::thresholds::THRESHOLDS as T;
-use crate::robot::Prior;
+use crate::plant::{self, Parameter};
+use crate::robot::{JointTerm, Prior};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use rayon::prelude::*;
@@ -38,6 +39,23 @@ struct Reduced {
     pull: Mat<f64>,
     /// of every effect: `WᵀZ`, `ZᵀZ`, `Zᵀr`
     effects: Vec<[Mat<f64>; 3]>,
+}
+
+impl Reduced {
+    /// Adds as effects that sets of parameters are anything.
+    fn release(&mut self, sets: &[Vec<usize>]) {
+        let (gram, pull) = (&self.gram, &self.pull);
+        let of = |set: &Vec<usize>| {
+            let k = set.len();
+            [
+                Mat::from_fn(gram.nrows(), k, |i, c| gram[(i, set[c])]),
+                Mat::from_fn(k, k, |a, c| gram[(set[a], set[c])]),
+                Mat::from_fn(k, 1, |c, _| pull[(set[c], 0)]),
+            ]
+        };
+        let all: Vec<_> = sets.iter().map(of).collect();
+        self.effects.extend(all);
+    }
 }
 
 /// Scales the prior of a model that claims to be identified by the factors that the records find
@@ -60,7 +78,68 @@ pub fn tighten(data: &mut Data, effects: &[Box<dyn Effect>]) -> crate::error::Re
 fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> Closeness {
     let data = evidence.data;
     let hidden = effects.iter().filter(|e| e.hides());
-    let tasks: Vec<(&dyn Effect, Place, Shape)> = hidden
+    let (reduced, price) = reduced(evidence, cx, hidden);
+    let scales = T.closeness.scales;
+    let pairs: Vec<Closeness> = scales
+        .iter()
+        .flat_map(|a| scales.iter().map(move |b| [*a, *b]))
+        .filter(|[a, b]| a.max(*b) < T.closeness.apart * a.min(*b))
+        .collect();
+    let costs: Vec<f64> = pairs
+        .par_iter()
+        .map(|c| cost(&reduced, &factors(&data.parameters, *c), price))
+        .collect();
+    // the loosest that are nearly as likely: robots of few joints say little about it
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let likely = (0..pairs.len()).filter(|i| costs[*i] <= least + T.closeness.likely);
+    let product = |i: &usize| pairs[*i][0] * pairs[*i][1];
+    let loosest = likely.max_by(|a, b| product(a).total_cmp(&product(b)));
+    loosest.map_or([1.0; 2], |i| pairs[i])
+}
+
+/// Whether some terms of joints are off: whether the records are likelier with them as unknowns than with the values of the robot file, the
+/// best effect beside either that a refit may absorb, or none. They are not for what a sound model leaves. That one term is off, or those of one joint, is an effect, too.
+///
+/// # Errors
+/// Poses that cannot be reached.
+pub fn are_off(
+    data: &Data,
+    terms: &[JointTerm],
+    effects: &[Box<dyn Effect>],
+) -> crate::error::Result<bool> {
+    let evidence = Evidence::new(data, 1.0);
+    let phi = evidence.parameters(&[], &evidence.fit(&[]));
+    let cx = Context::new(data, phi)?;
+    let absorbed = effects.iter().filter(|e| e.hides() || e.is_alike());
+    let (mut reduced, price) = reduced(&evidence, &cx, absorbed);
+    let joint_of = |p: &Parameter| match p.kind {
+        plant::Column::Term { joint, term } if terms.contains(&term) => Some(joint),
+        _ => None,
+    };
+    let of: Vec<Option<usize>> = data.parameters.iter().map(joint_of).collect();
+    let with = |reduced: &Reduced, known: f64| {
+        let s = of.iter().map(|j| if j.is_some() { known } else { 1.0 });
+        cost(reduced, &s.collect::<Vec<_>>(), price)
+    };
+    let each = (0..of.len()).filter(|i| of[*i].is_some());
+    let mut sets: Vec<Vec<usize>> = each.clone().map(|i| vec![i]).collect();
+    for j in 0..data.plant.robot().joints.len() {
+        let own: Vec<usize> = each.clone().filter(|i| of[*i] == Some(j)).collect();
+        sets.extend((own.len() > 1).then_some(own));
+    }
+    reduced.release(&sets);
+    let slack = T.gap.slack * (data.fitted * data.joints()) as f64;
+    Ok(with(&reduced, 1.0) + slack < with(&reduced, 0.0))
+}
+
+/// Products of the columns of effects, of all shapes at all sites, with those of the model; and what a coefficient costs.
+fn reduced<'e>(
+    evidence: &Evidence,
+    cx: &Context,
+    effects: impl Iterator<Item = &'e Box<dyn Effect>>,
+) -> (Reduced, f64) {
+    let data = evidence.data;
+    let tasks: Vec<(&dyn Effect, Place, Shape)> = effects
         .flat_map(|e| {
             e.sites(cx).into_iter().flat_map(move |place| {
                 let shapes = e.shapes(cx, &place);
@@ -94,22 +173,7 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
         pull: pull * (1.0 / level),
         effects: each.into_iter().flatten().collect(),
     };
-    let scales = T.closeness.scales;
-    let pairs: Vec<Closeness> = scales
-        .iter()
-        .flat_map(|a| scales.iter().map(move |b| [*a, *b]))
-        .filter(|[a, b]| a.max(*b) < T.closeness.apart * a.min(*b))
-        .collect();
-    let costs: Vec<f64> = pairs
-        .par_iter()
-        .map(|c| cost(&reduced, &factors(&data.parameters, *c), samples.ln()))
-        .collect();
-    // the loosest that are nearly as likely: robots of few joints say little about it
-    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
-    let likely = (0..pairs.len()).filter(|i| costs[*i] <= least + T.closeness.likely);
-    let product = |i: &usize| pairs[*i][0] * pairs[*i][1];
-    let loosest = likely.max_by(|a, b| product(a).total_cmp(&product(b)));
-    loosest.map_or([1.0; 2], |i| pairs[i])
+    (reduced, samples.ln())
 }
 
 /// `−2 ln p` less what does not depend on the factors, with the best effect or none.

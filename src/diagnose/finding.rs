@@ -45,6 +45,8 @@ pub struct Finding {
     pub decoys: Option<f64>,
     /// what coefficients of their own for every fitted record gain over what the effect gains; of members
     pub unsteady: Option<f64>,
+    /// the same with coefficients of their own for every joint; of a delay of the whole robot
+    pub uneven: Option<f64>,
     /// parameters
     pub values: Vec<Value>,
     /// effects that this data cannot tell from it
@@ -80,6 +82,7 @@ impl Finding {
             visibility: 1.0,
             decoys: None,
             unsteady: None,
+            uneven: None,
             values: effect.values(cx, &estimated),
             same: Vec::new(),
             mujoco: in_mujoco(cx, effect, &estimated),
@@ -164,6 +167,7 @@ fn members(
             visibility: m.visibility,
             decoys: m.decoys,
             unsteady: m.unsteady,
+            uneven: m.uneven,
             same,
             frozen: m.frozen,
             ..Finding::of(cx, effect, estimated)

@@ -39,6 +39,7 @@ fn finding(f: &Finding) -> Value {
         "visibility": number(f.visibility),
         "decoys": f.decoys.map(number),
         "unsteady": f.unsteady.map(number),
+        "uneven": f.uneven.map(number),
         "parameters": parameters,
         "simulator": { "mujoco": f.mujoco },
         "indistinguishable_from": f.same,
@@ -187,6 +188,7 @@ pub fn json(d: &Diagnosis, seconds: f64) -> Value {
         },
         "findings": d.findings.iter().map(finding).collect::<Vec<_>>(),
         "unexplained": number(d.unexplained),
+        "stays_on": d.stays_on,
         "holdout_shrink": d.shrink().map(number),
         "at_rest": d.at_rest.iter().map(|r| json!({
             "record": r.record,

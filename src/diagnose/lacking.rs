@@ -1,8 +1,8 @@
 //! Friction that the robot file does not hold.
 //!
-//! A file from CAD often states no friction at all, and every machine has some in every joint. The effects of the catalogue
-//! are told apart beside a model with friction; without it the first of them takes what it can of the friction of all joints.
-//! So viscous and Coulomb friction and an offset of every joint are fitted with the nominal model first,
+//! A file from CAD often states no friction at all, that of a simulator only damping, and every machine has both in every joint. The
+//! effects of the catalogue are told apart beside a model with friction; without it the first of them takes what it can of the
+//! friction of all joints. So what the file states of no joint, and an offset of every joint, is fitted with the nominal model first,
 //!
 //! ```text
 //! τ = W (φ₀ + δ) + Σ_j (F_v q̇ + F_c sgn q̇ + o)_j + ε        δ ~ N(0, P),  F_v, F_c > 0
@@ -23,12 +23,13 @@ use super::improve::Improved;
 use super::payload::Loads;
 use super::thresholds::THRESHOLDS as T;
 use super::verdict::{State, Verdict, inflation};
-use super::{gathered, interval};
+use super::{catalogue, closeness, gathered, interval};
 use crate::error::{Result, Warning, WarningKind};
 use crate::export::{Part, Remark};
 use crate::log;
 use crate::plant::{self, Plant};
 use crate::robot::{Joint, JointTerm, Robot};
+use std::borrow::Cow;
 
 /// What is fitted where nothing is stated, and the effect that it is.
 const TERMS: [(JointTerm, &str); 3] = [
@@ -75,52 +76,185 @@ struct Taken {
     holdout: Option<f64>,
 }
 
-/// The terms of all actuators among the parameters of a model.
-fn terms(plant: &Plant) -> Vec<Own> {
-    let actuated = plant.actuated();
-    let of = |(at, p): (usize, &plant::Parameter)| match p.kind {
-        plant::Column::Term { joint, term } => Some(Own {
-            at,
-            actuator: actuated.iter().position(|a| *a == joint)?,
-            term,
-            effect: TERMS.iter().find(|t| t.0 == term)?.1,
-        }),
-        _ => None,
-    };
-    let all = plant.parameters().iter().enumerate();
-    all.filter_map(of).collect()
+/// What the file of a robot leaves out of its friction: viscous or Coulomb friction that it states of no joint, or lists of a joint to be
+/// identified without a value, and an offset beside the former.
+#[derive(Clone, Debug)]
+pub struct Lacking {
+    /// by joint, in the order of [`JointTerm::ALL`]
+    of: Vec<[bool; JointTerm::ALL.len()]>,
 }
 
-/// Whether a file of a tree states no friction of any joint, and none to be fitted.
-fn states_none(plant: &Plant) -> bool {
-    let unknown = |j: &&Joint| j.identify.contains(&true);
-    chain::may_lack_friction(plant)
-        && frictionless(plant.robot())
-        && !plant.actuators().iter().any(unknown)
+impl Lacking {
+    /// What the file of a tree leaves out; `None` where that is neither viscous nor Coulomb friction.
+    pub fn of(plant: &Plant) -> Option<Self> {
+        const FRICTION: [JointTerm; 2] = [JointTerm::Viscous, JointTerm::Coulomb];
+        let robot = plant.robot();
+        let of_all = |term: JointTerm| !states(robot, term);
+        let offsets = FRICTION.map(of_all).contains(&true) && of_all(JointTerm::Offset);
+        let lacks = |j: &Joint, term: JointTerm| match term {
+            JointTerm::Armature => false,
+            JointTerm::Offset => offsets,
+            _ => of_all(term) || j.identify[term as usize] && j.terms[term as usize] == 0.0,
+        };
+        let joints = robot.joints.iter();
+        let of: Vec<_> = joints
+            .map(|j| JointTerm::ALL.map(|t| lacks(j, t)))
+            .collect();
+        let any = of.iter().flatten().any(|lacks| *lacks);
+        (any && chain::may_lack_friction(plant)).then_some(Self { of })
+    }
+
+    /// The robot with it among its unknowns.
+    fn opened(&self, plant: &Plant) -> Plant {
+        let joints = plant.robot().joints.iter();
+        let names: Vec<&str> = joints.map(|j| j.name.as_str()).collect();
+        let also = |j: &Joint| {
+            let at = names.iter().position(|name| *name == j.name);
+            JointTerm::ALL
+                .map(|t| j.identify[t as usize] || at.is_some_and(|at| self.of[at][t as usize]))
+        };
+        plant.clone().identifying(&also)
+    }
+
+    /// Its terms of all actuators among the parameters of a model.
+    fn terms(&self, plant: &Plant) -> Vec<Own> {
+        let actuated = plant.actuated();
+        let of = |(at, p): (usize, &plant::Parameter)| match p.kind {
+            plant::Column::Term { joint, term } if self.of[joint][term as usize] => Some(Own {
+                at,
+                actuator: actuated.iter().position(|a| *a == joint)?,
+                term,
+                effect: TERMS.iter().find(|t| t.0 == term)?.1,
+            }),
+            _ => None,
+        };
+        let all = plant.parameters().iter().enumerate();
+        all.filter_map(of).collect()
+    }
+
+    /// Whether a robot has none of it.
+    fn is_left_out(&self, robot: &Robot) -> bool {
+        let all = robot.joints.iter().zip(&self.of);
+        let none =
+            |(j, lacks): (&Joint, &[bool; 4])| (0..4).all(|t| !lacks[t] || j.terms[t] == 0.0);
+        all.into_iter().all(none)
+    }
+
+    /// What the report says of it.
+    pub fn warning(&self, plant: &Plant) -> Warning {
+        let joints = &plant.robot().joints;
+        let lacks = |term: JointTerm| -> Vec<&str> {
+            let all = joints.iter().zip(&self.of);
+            let lack = all.filter(|(_, lacks)| lacks[term as usize]);
+            lack.map(|(j, _)| j.name.as_str()).collect()
+        };
+        let of = |term: JointTerm, word: &str| match lacks(term) {
+            none if none.is_empty() => None,
+            all if all.len() == joints.len() => Some(word.to_string()),
+            some => Some(format!("{word} of {}", some.join(", "))),
+        };
+        let all = TERMS.map(|t| lacks(t.0).len() == joints.len());
+        let (stated, fitted) = match all {
+            [true, true, false] => (
+                "friction".into(),
+                "viscous and Coulomb friction of each joint".into(),
+            ),
+            [true, true, true] => (
+                "friction".into(),
+                "viscous and Coulomb friction and an offset of each joint".into(),
+            ),
+            _ => {
+                let of = [
+                    of(JointTerm::Viscous, "viscous friction"),
+                    of(JointTerm::Coulomb, "Coulomb friction"),
+                ];
+                let stated = of
+                    .into_iter()
+                    .flatten()
+                    .collect::<Vec<_>>()
+                    .join(" and no ");
+                let fitted = if all[2] {
+                    "this and an offset of each joint"
+                } else {
+                    "this"
+                };
+                (stated, fitted.to_string())
+            }
+        };
+        Warning::new(
+            WarningKind::JointTermsAssumed,
+            plant.name(),
+            format!(
+                "its file states no {stated}; {fitted} was fitted with its model first, and other effects were looked for \
+                 beside it"
+            ),
+        )
+    }
 }
 
-/// Whether no joint of a robot has friction.
-fn frictionless(robot: &Robot) -> bool {
-    let of = |j: &Joint| [JointTerm::Viscous, JointTerm::Coulomb].map(|t| j.terms[t as usize]);
-    robot.joints.iter().all(|j| of(j) == [0.0; 2])
+/// Whether a robot has a term in any of its joints.
+fn states(robot: &Robot, term: JointTerm) -> bool {
+    robot.joints.iter().any(|j| j.terms[term as usize] != 0.0)
 }
 
-/// The robot with the friction that its records show, where its file states none; `None` where it does, or they show none.
+/// What a file states of friction and rotors without listing it: of the file of a tree that lists nothing to be identified.
+fn unlisted(plant: &Plant) -> Vec<JointTerm> {
+    let listed = |j: &&Joint| j.identify.contains(&true);
+    match !chain::may_lack_friction(plant) || plant.actuators().iter().any(listed) {
+        true => Vec::new(),
+        false => {
+            let all = JointTerm::ALL.into_iter();
+            all.filter(|t| states(plant.robot(), *t)).collect()
+        }
+    }
+}
+
+/// The robot as it is diagnosed, and what was found: the file that the gap is counted from, and what it leaves out.
+pub type AsDiagnosed<'a> = (Cow<'a, Plant>, Option<(Plant, Lacking)>);
+
+/// The robot with the friction that its records show, where its file leaves some out. Friction and rotors that the file states, and
+/// does not list, are unknowns where the records are likelier so.
 ///
 /// # Errors
 /// Poses that cannot be reached.
-pub fn with_friction(plant: &Plant, logs: &[log::Record]) -> Result<Option<Plant>> {
-    if !states_none(plant) {
-        return Ok(None);
-    }
-    // a rotor that the file states is as well known as its bodies
-    let rotor = |j: &Joint| j.terms[JointTerm::Armature as usize] != 0.0;
-    let rotors = plant.robot().joints.iter().any(rotor);
-    let mut free = TERMS.map(|t| t.0).to_vec();
-    free.extend(rotors.then_some(JointTerm::Armature));
-    let open = plant.clone().with_terms(&free);
+pub fn with_friction<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<AsDiagnosed<'a>> {
+    let stated = unlisted(plant);
+    let open = match stated.is_empty() {
+        true => Cow::Borrowed(plant),
+        false => Cow::Owned(plant.clone().with_terms(&stated)),
+    };
+    let found = match Lacking::of(plant) {
+        Some(lacking) => fit_lacking(&open, &lacking, logs)?.map(|with| (with, lacking)),
+        None => None,
+    };
+    let with = found.as_ref().map_or(&*open, |(with, _)| with);
+    let off = !stated.is_empty() && {
+        let data = gathered(with, logs, Loads::One)?.completed(Assumed::default())?;
+        closeness::are_off(&data, &stated, &catalogue::all())?
+    };
+    // what is taken at its word is no unknown
+    let known = |of: Plant| -> Plant {
+        let listed = |j: &Joint| {
+            let kept = |t: JointTerm| j.identify[t as usize] && (off || !stated.contains(&t));
+            JointTerm::ALL.map(kept)
+        };
+        of.identifying(&listed)
+    };
+    Ok(match found {
+        Some((with, lacking)) => (
+            Cow::Owned(known(with)),
+            Some((known(open.into_owned()), lacking)),
+        ),
+        None if off => (open, None),
+        None => (Cow::Borrowed(plant), None),
+    })
+}
+
+/// The robot with what its file leaves out and the records show; `None` where they show none.
+fn fit_lacking(plant: &Plant, lacking: &Lacking, logs: &[log::Record]) -> Result<Option<Plant>> {
+    let open = lacking.opened(plant);
     let mut data = gathered(&open, logs, Loads::One)?.completed(Assumed::default())?;
-    let terms = terms(&open);
+    let terms = lacking.terms(&open);
     for own in &terms {
         let speed = match own.term {
             JointTerm::Viscous => data.speed[own.actuator],
@@ -140,7 +274,8 @@ pub fn with_friction(plant: &Plant, logs: &[log::Record]) -> Result<Option<Plant
         }
         if out.is_empty() {
             let shown = terms.iter().any(|own| data.spread[own.at] > 0.0);
-            return Ok(shown.then(|| open.valued(&stated(&open, &terms, &data, &phi))));
+            let values = stated(&open, &terms, &data, &phi);
+            return Ok(shown.then(|| open.valued(&values)));
         }
         out.iter().for_each(|i| data.spread[terms[*i].at] = 0.0);
     }
@@ -174,6 +309,8 @@ fn stated(plant: &Plant, terms: &[Own], data: &Data, phi: &[f64]) -> Vec<f64> {
 
 /// What a search beside friction that the file does not hold has found.
 pub struct Beyond<'a> {
+    /// what the file leaves out
+    pub lacking: &'a Lacking,
     /// the nominal model with that friction
     pub evidence: &'a Evidence<'a>,
     /// what columns are made from
@@ -190,6 +327,8 @@ pub struct Beyond<'a> {
 
 /// The gap and its explanation, counted from the file without friction.
 pub struct Lacked {
+    /// what the file leaves out
+    pub lacking: Lacking,
     /// parameters of the file, with zeros for what was fitted later
     pub nominal: Vec<f64>,
     /// parameters of a refit without friction
@@ -210,7 +349,7 @@ impl Beyond<'_> {
     /// Counts the gap from the robot file `plant`.
     pub fn lacked(&self, plant: &Plant) -> Lacked {
         let data = self.evidence.data;
-        let terms = terms(data.plant);
+        let terms = self.lacking.terms(data.plant);
         let actuators = plant.actuators();
         let mut bare = data.clone();
         for own in &terms {
@@ -228,6 +367,7 @@ impl Beyond<'_> {
         let share = |part: f64, of: f64| (part / of.max(1e-9)).clamp(0.0, 1.0);
         let shows = st.shows_held(whole[1]);
         Lacked {
+            lacking: self.lacking.clone(),
             nominal: evidence.phi.clone(),
             refit: evidence.parameters(&[], &none),
             findings: self.findings(&st, &terms, &residual, [&before, &held]),
@@ -319,12 +459,9 @@ impl Beyond<'_> {
             let first = others.iter().all(|other| known(other) < sure);
             let alone = T.confidence.body.above(sure);
             let told = alone >= T.confidence.claim;
-            let fitted = estimate(
-                own.place(),
-                &Shape::default(),
-                &[self.phi[own.at]],
-                &[std(own)],
-            );
+            // of an effect, what lies beyond the nominal value
+            let beyond = self.phi[own.at] - self.cx.stated(&own.place(), own.term);
+            let fitted = estimate(own.place(), &Shape::default(), &[beyond], &[std(own)]);
             out.push(Finding {
                 confidence: match first && !told && !others.is_empty() {
                     true => taken.confidence,
@@ -362,7 +499,7 @@ impl Lacked {
             })
         };
         // a model that was left as it is in the file has none
-        if frictionless(&improved.robot) {
+        if self.lacking.is_left_out(&improved.robot) {
             return;
         }
         let all: Vec<Remark> = claimed.filter_map(remark).collect();
@@ -386,14 +523,4 @@ impl Lacked {
             other => other,
         }
     }
-}
-
-/// What the report says of it.
-pub fn warning(plant: &Plant) -> Warning {
-    Warning::new(
-        WarningKind::JointTermsAssumed,
-        plant.name(),
-        "its file states no friction; viscous and Coulomb friction and an offset of each joint were fitted with its model \
-         first, and other effects were looked for beside them",
-    )
 }

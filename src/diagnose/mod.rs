@@ -89,7 +89,7 @@ use crate::plant::Plant;
 use crate::signals::series::Series;
 use channel::Assumed;
 use data::Data;
-use lacking::Beyond;
+use lacking::{Beyond, Lacking};
 use payload::Loads;
 use rayon::prelude::*;
 use searched::Searched;
@@ -145,10 +145,8 @@ pub fn diagnose(
     settings: &Settings,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
-    let mut warnings = experiment.plant.warnings().to_vec();
-    warnings.extend(experiment.records.iter().flat_map(|r| r.warnings.clone()));
     let mut out = of_logs(&experiment.plant, &experiment.records, settings, progress)?;
-    out.warnings.splice(0..0, warnings);
+    out.warnings.splice(0..0, experiment.warnings());
     Ok(out)
 }
 
@@ -163,16 +161,15 @@ pub fn of_logs(
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis> {
     progress("noise and nominal model");
-    match lacking::with_friction(plant, logs)? {
-        Some(with) => of_plant(&with, Some(plant), logs, settings, progress),
-        None => of_plant(plant, None, logs, settings, progress),
-    }
+    let (plant, found) = lacking::with_friction(plant, logs)?;
+    let file = found.as_ref().map(|(file, lacking)| (file, lacking));
+    of_plant(&plant, file, logs, settings, progress)
 }
 
-/// Diagnoses logs of a robot with its friction, where its `file` states none.
+/// Diagnoses logs of a robot with its friction, where its `file` leaves some of it out.
 fn of_plant<'a>(
     plant: &'a Plant,
-    file: Option<&Plant>,
+    file: Option<(&Plant, &Lacking)>,
     logs: &[log::Record],
     settings: &Settings,
     progress: &(dyn Fn(&str) + Sync),
@@ -227,8 +224,9 @@ fn of_plant<'a>(
     let fit = evidence.fit(&members);
     let phi_after = evidence.parameters(&members, &fit);
     let left = [&[][..], &members].map(|set| evidence.residual(set, &evidence.fit(set)));
-    let lacked = file.map(|file| {
+    let lacked = file.map(|(file, lacking)| {
         let found = Beyond {
+            lacking,
             evidence: &evidence,
             cx: &cx,
             effects: &effects,
@@ -314,7 +312,7 @@ fn of_plant<'a>(
         }
         None => verdict,
     };
-    warnings.extend(file.map(lacking::warning));
+    warnings.extend(file.map(|(file, lacking)| lacking.warning(file)));
     let (holdout, unexplained) = match &lacked {
         Some(l) => (l.holdout, l.unexplained),
         None => (decision.holdout, decision.unexplained),
@@ -345,6 +343,11 @@ fn of_plant<'a>(
         at_rest,
         second_encoder,
         stands_out: decision.stands_out || much,
+        stays_on: decision
+            .stay
+            .iter()
+            .map(|j| plant.actuators()[*j].name.clone())
+            .collect(),
         unexplained: if data.moves() { unexplained } else { 1.0 },
         traces: traces::traces(data, &refit, &after),
         noise_source: result::noise_source(data),

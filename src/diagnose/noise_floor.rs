@@ -29,9 +29,16 @@ impl Data<'_> {
             }
             None => self.noise_above_the_band(j),
         };
-        noise.at_least(self.least_noise(j), self.filtered(j));
+        self.floored(&mut noise, j);
         noise.with_excess(&self.position_excess(j));
         noise
+    }
+
+    /// No less noise than a share of the torque: where there is next to none, behind a coarse encoder, and where no period repeats. A
+    /// drive smooths its torque, and what is left above the band of the motion then says little of what lies in it.
+    fn floored(&self, noise: &mut Noise, j: usize) {
+        let always = self.filtered(j) || noise.source == Source::HighBand;
+        noise.at_least(self.least_noise(j), always);
     }
 
     /// Without repetition: the torque above the band of the motion, where the actuator moves.
@@ -187,9 +194,9 @@ impl Data<'_> {
                 let whole: Vec<f64> = rows.map(|((raw, left), e)| raw - left + e).collect();
                 let e = self.counted_residual(j, &whole);
                 if !e.is_empty() {
-                    self.noise[j] = Noise::from_residual(&e, dt, band);
-                    let (least, coarse) = (self.least_noise(j), self.filtered(j));
-                    self.noise[j].at_least(least, coarse);
+                    let mut noise = Noise::from_residual(&e, dt, band);
+                    self.floored(&mut noise, j);
+                    self.noise[j] = noise;
                 }
             }
             let mut seen = vec![0.0; LINES + 1];

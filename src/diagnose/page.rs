@@ -9,6 +9,7 @@ mod simulated;
 mod simulators;
 mod summary;
 
+use super::catalogue::Value;
 use super::finding::Finding;
 use super::result::Diagnosis;
 use super::thresholds::THRESHOLDS as T;
@@ -30,10 +31,19 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         );
     }
     let names = || -> String {
-        let plain = |f: &&Finding| match (f.records.is_empty(), f.joints.is_empty()) {
-            (false, _) => format!("{} in {}", f.title, f.records.join(" and ")),
-            (true, true) => f.title.to_string(),
-            (true, false) => format!("{} on {}", f.title, f.joints.join(" and ")),
+        let plain = |f: &&Finding| {
+            let place = match (f.records.is_empty(), f.joints.is_empty()) {
+                (false, _) => format!(" in {}", f.records.join(" and ")),
+                (true, true) => String::new(),
+                (true, false) => format!(" on {}", f.joints.join(" and ")),
+            };
+            let unknown = f.values.iter().any(Value::is_unknown_mass);
+            let mass = if unknown {
+                ", its mass not determined"
+            } else {
+                ""
+            };
+            format!("{}{place}{mass}", f.title)
         };
         match (claims.as_slice(), d.findings.first()) {
             ([], Some(f)) if !f.same.is_empty() => format!(
@@ -62,6 +72,14 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             percent(d.unexplained)
         ),
         None => format!("{with}{} of the gap stays", percent(d.unexplained)),
+    };
+    let left = match (d.stays_on.as_slice(), d.friction_found) {
+        ([], _) => left,
+        (joints, false) => format!("{left}, and of that of {} more than half", listed(joints)),
+        (joints, true) => format!(
+            "{left}, and of what friction leaves on {} more than half",
+            listed(joints)
+        ),
     };
     let left = match d.verdict {
         Verdict::PartlyExplained if d.friction_alone() => {

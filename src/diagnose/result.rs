@@ -73,6 +73,8 @@ pub struct Diagnosis {
     pub stands_out: bool,
     /// share of the gap that stays
     pub unexplained: f64,
+    /// joints whose own gap stays for the most part; beside friction that the file leaves out, what that friction leaves of it
+    pub stays_on: Vec<String>,
     /// share of the gap that any function of the state could explain, by cross-validation between
     /// periods of state bins; `None` where there is nothing to explain, or no record repeats
     pub bound: Option<f64>,

@@ -54,6 +54,8 @@ pub struct Decision {
     pub surprise: [f64; 2],
     /// share of the gap that stays
     pub unexplained: f64,
+    /// actuators on which it stays for the most part
+    pub stay: Vec<usize>,
     /// whether the refit leaves more on a joint than a sound model does
     pub stands_out: bool,
 }
@@ -97,11 +99,11 @@ pub fn decide(
     // against the frozen model
     let claims = |m: &Member| m.together >= T.confidence.claim;
     let hides = members.iter().any(|m| m.frozen && claims(m));
-    let whole = |fit: bool| st.above(&st.gap(&evidence.r, fit), fit);
-    let [base, base_held] = match hides {
-        true => [whole(true), whole(false)],
-        false => [st.total, st.above(&hold_before, false)],
+    let [of_joints, of_joints_held] = match hides {
+        true => [true, false].map(|fit| st.gap(&evidence.r, fit)),
+        false => [before.clone(), hold_before],
     };
+    let [base, base_held] = [st.above(&of_joints, true), st.above(&of_joints_held, false)];
     let held = st.above(&hold_after, false);
     let unexplained = (st.above(&after, true) / base.max(1e-9)).min(1.0);
     let surprising = surprise > T.hidden.surprise + T.hidden.per_parameter * st.freedoms;
@@ -109,8 +111,10 @@ pub fn decide(
     let claimed = members.iter().any(claims);
     let shows = stands_out(&st, &before);
     let left_there = held_out(&st, &hold_after);
+    let stay = staying(&st, &after, &of_joints);
     let remains = stands_out(&st, &after) && unexplained > T.gap.unexplained
-        || left_there && held / base_held.max(1e-9) > T.gap.unexplained;
+        || left_there && held / base_held.max(1e-9) > T.gap.unexplained
+        || !stay.is_empty();
     // a gap that is on other joints than the claims, and too small to count, says nothing of them
     let told = !claimed || members.iter().any(|m| claims(m) && m.holdout.is_some());
     let verdict = match (shows || surprising, claimed) {
@@ -128,13 +132,20 @@ pub fn decide(
         },
         surprise: [surprise, surprise_after],
         unexplained,
+        stay,
         stands_out: shows,
     }
 }
 
 /// Whether the gap of any joint is larger than a sound model leaves.
 fn stands_out(st: &State, gap: &[f64]) -> bool {
-    st.largest(gap) > T.gap.sound * st.evidence.data.fitted as f64
+    (0..gap.len()).any(|j| st.stands_out(gap, j))
+}
+
+/// Actuators whose gap is larger than a sound model leaves and stays for the most part, however small it is beside those of others.
+fn staying(st: &State, after: &[f64], before: &[f64]) -> Vec<usize> {
+    let stays = |j: &usize| after[*j] > T.gap.of_joint * before[*j] && st.stands_out(after, *j);
+    (0..after.len()).filter(stays).collect()
 }
 
 /// Whether the gap of any joint on records held out is far above the noise.

@@ -5,7 +5,7 @@ use super::stack::Stack;
 use super::{aside, standstill, torque_units};
 use crate::base::BaseParameters;
 use crate::error::{Error, Result, Warning, WarningKind};
-use crate::log::{Payload, Purpose, Record};
+use crate::log::{Payload, Purpose, Record, warnings_of};
 use crate::plant::Plant;
 use crate::signals::{self, Prepared};
 use rayon::prelude::*;
@@ -37,7 +37,7 @@ pub(super) fn without_payload<'a>(
     records: &'a [Record],
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<&'a Record>> {
-    warnings.extend(records.iter().flat_map(|r| r.warnings.clone()));
+    warnings.extend(warnings_of(records));
     for r in records {
         if r.payload != Payload::None {
             warnings.push(Warning::new(

@@ -27,7 +27,19 @@ impl Experiment {
 
     /// Everything that was found in robot and logs.
     pub fn warnings(&self) -> Vec<Warning> {
-        let logs = self.records.iter().flat_map(|r| r.warnings.clone());
-        self.plant.warnings().iter().cloned().chain(logs).collect()
+        let mut all = self.plant.warnings().to_vec();
+        all.extend(warnings_of(&self.records));
+        all
     }
+}
+
+/// What was found in logs, each once: parts of one file share what was found in it.
+pub(crate) fn warnings_of(records: &[Record]) -> Vec<Warning> {
+    let mut out: Vec<Warning> = Vec::new();
+    for warning in records.iter().flat_map(|r| &r.warnings) {
+        if !out.contains(warning) {
+            out.push(warning.clone());
+        }
+    }
+    out
 }

@@ -36,6 +36,7 @@ mod unit;
 mod written;
 
 pub use experiment::Experiment;
+pub(crate) use experiment::warnings_of;
 #[doc(hidden)]
 pub use outline::Outline;
 pub(crate) use parts::{Payload, Purpose};

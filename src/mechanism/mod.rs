@@ -388,9 +388,14 @@ impl Mechanism {
     }
 
     /// The same mechanism with other terms of its actuators as unknowns.
-    pub fn with_terms(mut self, terms: &[JointTerm]) -> Self {
+    pub fn with_terms(self, terms: &[JointTerm]) -> Self {
+        self.identifying(&|_| JointTerm::ALL.map(|t| terms.contains(&t)))
+    }
+
+    /// The same mechanism with these terms of each of its actuators as unknowns.
+    pub(crate) fn identifying(mut self, terms: &dyn Fn(&Joint) -> [bool; 4]) -> Self {
         for &a in &self.actuated {
-            self.robot.joints[a].identify = JointTerm::ALL.map(|t| terms.contains(&t));
+            self.robot.joints[a].identify = terms(&self.robot.joints[a]);
         }
         self.parameters.set_terms(&self.robot);
         self

@@ -133,10 +133,15 @@ impl Plant {
 
     /// The same robot with other joint columns in the regressor, the same for every actuator.
     pub fn with_terms(self, terms: &[JointTerm]) -> Self {
+        self.identifying(&|_| JointTerm::ALL.map(|t| terms.contains(&t)))
+    }
+
+    /// The same robot with these terms of each of its actuators as columns.
+    pub(crate) fn identifying(self, terms: &dyn Fn(&Joint) -> [bool; 4]) -> Self {
         let collisions = self.collisions;
         let other: Plant = match self.mechanism {
-            None => self.robot.with_terms(terms).into(),
-            Some(mechanism) => Arc::unwrap_or_clone(mechanism).with_terms(terms).into(),
+            None => self.robot.identifying(terms).into(),
+            Some(mechanism) => Arc::unwrap_or_clone(mechanism).identifying(terms).into(),
         };
         Plant {
             collisions,

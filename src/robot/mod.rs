@@ -192,9 +192,14 @@ impl Robot {
     }
 
     /// The same robot with other joint columns in the regressor, the same for every joint.
-    pub fn with_terms(mut self, terms: &[JointTerm]) -> Self {
+    pub fn with_terms(self, terms: &[JointTerm]) -> Self {
+        self.identifying(&|_| JointTerm::ALL.map(|t| terms.contains(&t)))
+    }
+
+    /// The same robot with these joint columns in the regressor.
+    pub(crate) fn identifying(mut self, terms: &dyn Fn(&Joint) -> [bool; 4]) -> Self {
         for joint in &mut self.joints {
-            joint.identify = JointTerm::ALL.map(|t| terms.contains(&t));
+            joint.identify = terms(joint);
         }
         self
     }

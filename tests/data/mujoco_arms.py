@@ -37,8 +37,17 @@ EFFECTS = [
     "stribeck_friction and torque_delay",
     "cogging and payload",
 ]
-#: what every arm has, and a bare file lacks
+#: what every arm has, and what files but the first of the following leave out, or do not list to be identified
 FRICTION = ["viscous_friction", "coulomb_friction", "torque_offset"]
+#: what robot files state of Coulomb and of viscous friction, and whether they list it
+FILES = {
+    "full": (True, True, True),
+    "stated": (True, True, False),
+    "coulomb": (True, False, False),
+    "viscous": (False, True, False),
+    "listed": (False, False, True),
+    "bare": (False, False, False),
+}
 #: name, seed, period (s), periods, share of the top speed
 RECORDS = [("fit_1", 1, 8.0, 2, 0.9), ("fit_2", 2, 12.0, 2, 0.36), ("fit_3", 3, 10.0, 2, 0.63), ("holdout", 4, 8.0, 1, 0.77)]
 #: length of a link (m), mass of the first (kg), top speed (rad/s), joints
@@ -226,21 +235,21 @@ class Machine:
         tau = tau[::every] + self.noise * rng.normal(size=tau[::every].shape)
         return np.c_[t[::every], np.round(q[::every] / step) * step, tau]
 
-    def file(self, bare=False):
+    def file(self, kind="full"):
         coulomb, viscous, rotor = self.nominal_friction
-        friction = [0.0 * coulomb, 0.0 * viscous, rotor] if bare else self.nominal_friction
+        friction = [coulomb * FILES[kind][0], viscous * FILES[kind][1], rotor]
         return mjcf(self.nominal, friction, 6 * self.scale)
 
-    def write(self, folder, bare=False):
+    def write(self, folder, kind="full"):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "arm.xml").write_text(self.file(bare))
+        (folder / "arm.xml").write_text(self.file(kind))
         robot = f'name = "arm"\nurdf = "arm.xml"\nprior = "{"identified" if self.close else "cad"}"\n'
         for j in range(self.n):
             robot += (
                 f'[[joint]]\nname = "joint{j + 1}"\ntorque_noise = {float(self.noise[j])!r}\nvelocity = {1.5 * self.top}\n'
                 f'position_resolution = {2 * np.pi / 2**self.bits!r}\nacceleration = 50.0\n'
             )
-            robot += "" if bare else 'identify = ["armature", "viscous", "coulomb", "offset"]\n'
+            robot += 'identify = ["armature", "viscous", "coulomb", "offset"]\n' if FILES[kind][2] else ""
             robot += f"gear_ratio = {GEAR}\n" if "cogging" in self.effect else ""
         (folder / "robot.toml").write_text(robot)
         experiment = 'robot = "robot.toml"\n'
@@ -265,13 +274,13 @@ def case(job):
     """What was named on one arm."""
     number, options = job
     machine, folder = Machine(options.seed, number, options.hobby), options.output / f"arm_{number:03d}"
-    machine.write(folder, options.bare)
+    machine.write(folder, options.file)
     told = [options.excite, "diagnose", folder / "experiment.toml", "--no-next", "--force", "--output", folder / "gap"]
     done = subprocess.run(told, capture_output=True, text=True, check=False)
     if done.returncode:
         return number, machine, "failed: " + done.stderr.strip(), []
     found = json.loads((folder / "gap/diagnosis.json").read_text())
-    known = FRICTION if options.bare else []
+    known = FRICTION if options.file != "full" else []
     claims = [f for f in found["findings"] if f["confidence"] >= options.claim and f["effect"] not in known]
     return number, machine, found["verdict"], [(f["effect"], f["joints"], f["confidence"]) for f in claims]
 
@@ -283,7 +292,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+", help="numbers of the arms that are made, instead of all")
     parser.add_argument("--hobby", action="store_true", help="hobby arms alone: 12 bits, 500 Hz, torques at an instant")
-    parser.add_argument("--bare", action="store_true", help="files that state no friction; the names of all friction are passed over")
+    parser.add_argument("--file", choices=FILES, default="full", help="what files state of friction; the names of friction that others lack are passed over")
     parser.add_argument("--claim", type=float, default=0.5, help="least confidence of a name that counts")
     parser.add_argument("--output", type=Path, default=Path("target/mujoco_arms"))
     options = parser.parse_args()

@@ -125,17 +125,98 @@ fn a_machine_without_friction_has_none() {
     assert!(claims(&d).is_empty() && !d.friction_found);
 }
 
-/// A file that says what is fitted, or states friction, is taken at its word.
+/// A file that states Coulomb friction alone, as a simulator's may: the viscous one is fitted first, and named joint by joint.
 #[test]
-fn a_file_that_states_friction_is_left_as_it_is() {
+fn one_kind_of_friction_that_the_file_lacks_is_named() {
     let machine = robots().1;
     let logs = logs_of([&machine; 4], &mut |_, _, _, _, _| 0.0);
     let mut stated = bare();
-    stated.joints[0].terms[JointTerm::Viscous as usize] = 0.7;
-    let fitted = bare().with_terms(&[JointTerm::Viscous]);
-    for model in [stated, fitted] {
-        assert!(!diagnosed(&model, &logs).friction_found);
+    for (j, joint) in stated.joints.iter_mut().enumerate() {
+        joint.terms[JointTerm::Coulomb as usize] = machine.joints[j].terms[2];
     }
+    let d = diagnosed(&stated, &logs);
+    assert_eq!(d.verdict, Verdict::Explained, "{:?}", claims(&d));
+    let found = friction(&d);
+    for (j, joint) in machine.joints.iter().enumerate() {
+        let own = found.iter().find(|f| (f.0, f.1) == ("viscous_friction", j));
+        let own = own.unwrap_or_else(|| panic!("{j}: {found:?}"));
+        assert!((own.2 / joint.terms[1] - 1.0).abs() < 0.1, "{own:?}");
+    }
+    assert!(
+        !found.iter().any(|f| f.0 == "coulomb_friction"),
+        "{found:?}"
+    );
+    assert!(others(&d).is_empty(), "{:?}", claims(&d));
+    let said = d
+        .warnings
+        .iter()
+        .find(|w| w.kind == WarningKind::JointTermsAssumed);
+    let said = said.expect("it is said").to_string();
+    assert!(said.contains("states no viscous friction"), "{said}");
+}
+
+/// A file that lists friction to be identified, and states none, lacks it as one that lists nothing.
+#[test]
+fn friction_that_is_listed_without_a_value_is_lacking() {
+    let machine = robots().1;
+    let logs = logs_of([&machine; 4], &mut |_, _, _, _, _| 0.0);
+    let fitted = bare().with_terms(&JointTerm::FRICTION);
+    let d = diagnosed(&fitted, &logs);
+    assert!(d.friction_found);
+    is_that_of(&d, &machine, 0.1);
+    assert!(others(&d).is_empty(), "{:?}", claims(&d));
+}
+
+/// What a file states and does not list is taken at its word where the records agree: of one joint with three times the friction, that is
+/// named. Where all joints are a fifth off it is as well known as the bodies, and that is ordinary.
+#[test]
+fn stated_friction_that_is_not_listed_may_be_off() {
+    let machine = robots().1;
+    let logs = logs_of([&machine; 4], &mut |_, _, _, _, _| 0.0);
+    let with = |factor: [f64; 2]| {
+        let mut model = bare();
+        for (j, joint) in model.joints.iter_mut().enumerate() {
+            joint.terms = machine.joints[j].terms;
+            let own = &mut joint.terms[JointTerm::Coulomb as usize];
+            *own *= factor[j];
+        }
+        diagnosed(&model, &logs)
+    };
+    let near = with([0.8, 1.2]);
+    assert_eq!(near.verdict, Verdict::NoGap, "{:?}", claims(&near));
+    assert!(claims(&near).is_empty() && !near.friction_found);
+    let far = with([1.0, 0.3]);
+    assert_eq!(
+        claims(&far),
+        [("coulomb_friction", vec![1])],
+        "{:?} {:?}",
+        far.verdict,
+        far.findings
+            .iter()
+            .map(|f| (f.effect, f.joints.clone(), f.confidence))
+            .collect::<Vec<_>>()
+    );
+    assert!(!far.friction_found);
+    // the whole term, not what lies beyond the file
+    let whole = friction(&far)[0].2;
+    let true_value = machine.joints[1].terms[JointTerm::Coulomb as usize];
+    assert!((whole / true_value - 1.0).abs() < 0.1, "{whole}");
+}
+
+/// Friction that a single joint lacks is an effect of this joint: nothing is fitted first.
+#[test]
+fn friction_that_one_joint_lacks_is_an_effect() {
+    let machine = robots().1;
+    let logs = logs_of([&machine; 4], &mut |_, _, _, _, _| 0.0);
+    let mut stated = bare().with_terms(&JointTerm::ALL);
+    for (j, joint) in stated.joints.iter_mut().enumerate() {
+        joint.terms = machine.joints[j].terms;
+    }
+    stated.joints[1].terms[JointTerm::Coulomb as usize] = 0.0;
+    stated.joints[1].identify[JointTerm::Coulomb as usize] = false;
+    let d = diagnosed(&stated, &logs);
+    assert!(!d.friction_found);
+    assert_eq!(claims(&d), [("coulomb_friction", vec![1])]);
 }
 
 /// A Panda with joint torque sensors and its bundled file, which states no friction: every joint has its own, and no two of them

@@ -109,6 +109,11 @@ pub struct Value {
 }
 
 impl Value {
+    /// Whether it is a mass that may as well be none (95 %).
+    pub fn is_unknown_mass(&self) -> bool {
+        self.name == "mass" && self.std.is_some_and(|s| 1.96 * s > self.value)
+    }
+
     /// `name = value unit`.
     pub fn line(&self) -> String {
         let line = format!("{} = {:.6} {}", self.name, self.value, self.unit);

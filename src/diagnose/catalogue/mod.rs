@@ -133,6 +133,10 @@ pub trait Effect: Sync {
     fn refinable(&self, _k: usize) -> bool {
         false
     }
+    /// Whether one of the whole robot is the same on every actuator, where each could have its own.
+    fn is_alike(&self) -> bool {
+        false
+    }
     /// Whether a refit of ordinary parameters may absorb it without a trace, so that values which are
     /// unlikely under their prior are its only sign.
     fn hides(&self) -> bool {

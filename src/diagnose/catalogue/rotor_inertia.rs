@@ -1,4 +1,4 @@
-//! Rotor inertia of an actuator whose model has none, `I_a q̈`.
+//! Rotor inertia of an actuator beyond what its file states, `I_a q̈`.
 
 use super::*;
 
@@ -37,8 +37,8 @@ impl Effect for RotorInertia {
         vec![Column::on(place.first(), values)]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > 0.0
+    fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
+        eta[0] > -cx.stated(place, JointTerm::Armature)
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -46,6 +46,7 @@ impl Effect for RotorInertia {
             place, eta, std, ..
         } = e;
         let unit = cx.unit(place.first(), Quantity::Inertia);
-        vec![value("rotor_inertia", eta[0], std[0], unit)]
+        let whole = cx.stated(place, JointTerm::Armature) + eta[0];
+        vec![value("rotor_inertia", whole, std[0], unit)]
     }
 }

@@ -38,6 +38,10 @@ impl Effect for TorqueDelay {
         true
     }
 
+    fn is_alike(&self) -> bool {
+        true
+    }
+
     fn late(&self) -> bool {
         true
     }

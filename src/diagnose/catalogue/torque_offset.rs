@@ -1,4 +1,4 @@
-//! Torque offset of an actuator whose model has none, `o`.
+//! Torque offset of an actuator beyond what its file states, `o`.
 
 use super::*;
 
@@ -42,6 +42,7 @@ impl Effect for TorqueOffset {
             place, eta, std, ..
         } = e;
         let unit = cx.torque_unit(place.first());
-        vec![value("torque_offset", eta[0], std[0], unit)]
+        let whole = cx.stated(place, JointTerm::Offset) + eta[0];
+        vec![value("torque_offset", whole, std[0], unit)]
     }
 }

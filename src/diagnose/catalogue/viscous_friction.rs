@@ -1,4 +1,4 @@
-//! Viscous friction of an actuator whose model has none, `F_v q̇`.
+//! Viscous friction of an actuator beyond what its file states, `F_v q̇`.
 
 use super::*;
 
@@ -37,8 +37,8 @@ impl Effect for ViscousFriction {
         vec![Column::on(place.first(), values)]
     }
 
-    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > 0.0
+    fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
+        eta[0] > -cx.stated(place, JointTerm::Viscous)
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -46,6 +46,7 @@ impl Effect for ViscousFriction {
             place, eta, std, ..
         } = e;
         let unit = cx.unit(place.first(), Quantity::Damping);
-        vec![value("viscous_friction", eta[0], std[0], unit)]
+        let whole = cx.stated(place, JointTerm::Viscous) + eta[0];
+        vec![value("viscous_friction", whole, std[0], unit)]
     }
 }

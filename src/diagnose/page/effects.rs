@@ -28,6 +28,7 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
             html! {
                 @if let Some(d) = f.decoys { (percent(d)) } @else { "–" }
                 div { small { @if let Some(u) = f.unsteady { "unsteady " (percent(u)) } } }
+                div { small { @if let Some(u) = f.uneven { "uneven " (percent(u)) } } }
             },
             html! {
                 (values(f))
@@ -51,9 +52,11 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
             noise that goes when the effect is added to the others; " strong { "visible" } " the share of the effect that the \
             nominal model cannot absorb by other parameters; " strong { "decoys" } " the most that the effect explains of its own when it \
             is moved in time, over what it explains in place: near 100 % it is as good as any signal; " strong { "unsteady" } " \
-            what coefficients of their own for every record would add to that, near 0 % where it is the same in all." }
+            what coefficients of their own for every record would add to that, near 0 % where it is the same in all; " strong { "uneven" } " \
+            the same of a delay of the whole robot, with one of its own for every joint." }
         @if d.friction_found {
-            p { "The robot file states no friction. Viscous and Coulomb friction of a joint have one share, which is that of both." }
+            p { "Friction that the robot file leaves out has a row for each joint. Viscous and Coulomb friction of a joint that were both \
+                left out have one share, which is that of both." }
         }
         (table(&head, &[1, 7], &set.iter().map(|f| row(f)).collect::<Vec<_>>()))
         @if !rest.is_empty() {
@@ -79,6 +82,8 @@ fn values(f: &Finding) -> Markup {
                 (v.name.replace('_', " ")) " "
                 @if half > WIDE * v.value.abs() {
                     "not determined"
+                } @else if v.is_unknown_mass() {
+                    "not determined (" (significant(v.value, 2)) " ± " (significant(half, 2)) " " (v.unit) ")"
                 } @else {
                     (significant(v.value, 4))
                     @if half > 0.0 { " ± " (significant(half, 2)) }

@@ -26,6 +26,8 @@ pub struct Gap {
     pub left: f64,
     /// Share of the gap that may stay in a gap that counts as explained. Unit: share. Source: by hand.
     pub unexplained: f64,
+    /// The same of a single joint. Unit: share. Source: by hand.
+    pub of_joint: f64,
     /// Gap per row of a joint on records held out from which on the share that stays there counts, too. Unit: noise
     /// variances. Source: by hand.
     pub held_out: f64,
@@ -41,6 +43,7 @@ pub(super) const GAP: Gap = Gap {
     slack_share: 0.3,
     left: 1.0,
     unexplained: 0.15,
+    of_joint: 0.5,
     held_out: 4.0,
     lags: 20,
 };

@@ -1,10 +1,11 @@
 //! The confidence of a member: a product of conditions, shared with its rivals.
 
+use super::super::catalogue::Place;
 use super::super::decoy;
 use super::super::search::Candidate;
 use super::super::thresholds::THRESHOLDS as T;
 use super::beside::Beside;
-use super::predict::{predicts, shown_on_both, unsteady};
+use super::predict::{Alike, predicts, shown_on_both};
 use super::rivals::{Rival, against, least_loss, rivals};
 use super::state::{State, others};
 
@@ -26,9 +27,10 @@ pub struct Member {
     /// the most that a decoy gains of its own, over what the effect gains; not of an effect that shows in
     /// parameters alone
     pub decoys: Option<f64>,
-    /// what coefficients of their own for every fitted record gain, over what the effect gains; not of an
-    /// effect that remembers, nor of whole sets of inertial parameters that show in parameters alone
+    /// what coefficients of their own for every fitted record gain, over what the effect gains; not of an effect that remembers, nor of whole sets of inertial parameters that show in parameters alone
     pub unsteady: Option<f64>,
+    /// the same with coefficients of their own for every actuator, of an effect that should be the same on all
+    pub uneven: Option<f64>,
     /// rivals by falling weight
     pub rivals: Vec<Rival>,
     /// standard deviations of the coefficients
@@ -59,16 +61,26 @@ pub fn judge(
         decoy::largest(evidence, moved, &c.eta, &beside, m.gain)
     });
     // whole sets of inertial parameters fit anything in a single record
+    let alike = Alike {
+        columns: &columns,
+        prior: effect.prior(),
+        beside: &beside,
+        together: m.with.gain,
+        own: m.gain,
+    };
     let unsteady = match st.remembers(c) || m.frozen && columns.len() > T.hidden.columns {
         true => None,
-        false => {
-            let with = (columns.as_slice(), effect.prior());
-            unsteady(evidence, with, &beside, m.with.gain, m.gain)
-        }
+        false => alike.unsteady(evidence),
+    };
+    let uneven = match c.place == Place::Robot && effect.is_alike() {
+        true => alike.uneven(evidence),
+        false => None,
     };
     let [eta, std] = m.coefficients();
     let known = known_by_itself(&m, &eta, &std);
-    let together = known * together(&m, &rivals, decoys, unsteady);
+    let steady = unsteady.map_or(1.0, |u| T.confidence.unsteady.below(u))
+        * uneven.map_or(1.0, |u| T.confidence.uneven.below(u));
+    let together = known * steady * together(&m, &rivals, decoys);
     Member {
         candidate: Candidate { eta, ..c.clone() },
         confidence: together / (1.0 + against(st, c.effect, &rivals)),
@@ -78,14 +90,15 @@ pub fn judge(
         visibility: c.projected.visibility(Some(&c.eta)),
         decoys,
         unsteady,
+        uneven,
         rivals,
         std,
         frozen: m.frozen,
     }
 }
 
-/// The product of all conditions, 0 to 1: that the member is there, or one of its rivals.
-fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<f64>) -> f64 {
+/// The product of all conditions but those on how steady it is, 0 to 1: that the member is there, or one of its rivals.
+fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>) -> f64 {
     let data = m.st.evidence.data;
     let [r0, r1] = &m.residual;
     let predicted = match m.frozen || m.st.remembers(m.member) {
@@ -94,7 +107,6 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>, unsteady: Option<
     };
     m.size()
         * shown_on_both(data, m.member, r0, r1)
-        * unsteady.map_or(1.0, |u| T.confidence.unsteady.below(u))
         * if m.frozen { 1.0 } else { m.matters }
         * T.confidence.predicts.above(predicted)
         * T.confidence.exceeds.below(predicted)

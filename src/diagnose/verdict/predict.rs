@@ -32,44 +32,68 @@ fn taken_and_fall(r0: &[Vec<f64>], r1: &[Vec<f64>], rows: Range<usize>) -> [f64;
     [taken, energy(r0, rows.clone()) - energy(r1, rows)]
 }
 
-/// What an effect gains from coefficients of its own in every fitted record, beyond what so many freedoms gain
-/// from noise, over what it gains (`own`) with the same in all: near 0 for one that is the same machine
-/// in every record. `None` with one record.
-pub fn unsteady(
-    evidence: &Evidence,
-    (columns, prior): (&[Column], f64),
-    beside: &[&Projected],
-    together: f64,
-    own: f64,
-) -> Option<f64> {
-    let data = evidence.data;
-    let fitted: Vec<usize> = (0..data.records.len())
-        .filter(|k| data.records[*k].fit)
-        .collect();
-    if fitted.len() < 2 {
-        return None;
-    }
-    let only = |column: &Column, k: usize| {
-        let rows = column.rows.iter().map(|(j, v)| {
-            let mut part = vec![0.0; v.len()];
-            part[data.span(k)].copy_from_slice(&v[data.span(k)]);
-            (*j, part)
+/// An effect beside others of a set, and what it gains there.
+pub struct Alike<'a> {
+    pub columns: &'a [Column],
+    /// deviation of its coefficients a priori
+    pub prior: f64,
+    /// the others
+    pub beside: &'a [&'a Projected],
+    /// gain of all
+    pub together: f64,
+    /// its own gain
+    pub own: f64,
+}
+
+impl Alike<'_> {
+    /// What it gains from coefficients of its own in every fitted record, beyond what so many freedoms gain from noise, over what it
+    /// gains with the same in all: near 0 for one that is the same machine in every record. `None` with one record.
+    pub fn unsteady(&self, evidence: &Evidence) -> Option<f64> {
+        let data = evidence.data;
+        let fitted = (0..data.records.len()).filter(|k| data.records[*k].fit);
+        let parts = fitted.map(|k| {
+            self.only(|v| {
+                let mut part = vec![0.0; v.len()];
+                part[data.span(k)].copy_from_slice(&v[data.span(k)]);
+                part
+            })
         });
-        Column {
-            rows: rows.collect(),
+        self.apart(evidence, parts.collect())
+    }
+
+    /// The same with coefficients of its own on every actuator.
+    pub fn uneven(&self, evidence: &Evidence) -> Option<f64> {
+        let on = |j: usize| -> Vec<Column> {
+            let rows = |c: &Column| c.rows.iter().filter(|(i, _)| *i == j).cloned().collect();
+            self.columns
+                .iter()
+                .map(|c| Column { rows: rows(c) })
+                .collect()
+        };
+        self.apart(evidence, (0..evidence.data.joints()).map(on).collect())
+    }
+
+    /// Its columns with other values.
+    fn only(&self, part: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Column> {
+        let of = |c: &Column| Column {
+            rows: c.rows.iter().map(|(j, v)| (*j, part(v))).collect(),
+        };
+        self.columns.iter().map(of).collect()
+    }
+
+    /// What parts with coefficients of their own gain beyond the whole.
+    fn apart(&self, evidence: &Evidence, parts: Vec<Vec<Column>>) -> Option<f64> {
+        if parts.len() < 2 {
+            return None;
         }
-    };
-    let apart: Vec<Vec<Column>> = fitted
-        .iter()
-        .map(|k| columns.iter().map(|c| only(c, *k)).collect())
-        .collect();
-    let mut projected = evidence.project_all(&apart);
-    projected.iter_mut().for_each(|p| p.prior = prior);
-    let mut set = beside.to_vec();
-    set.extend(&projected);
-    let freedoms = ((fitted.len() - 1) * columns.len()) as f64;
-    let more = evidence.fit(&set).gain - together - T.confidence.freedom * freedoms;
-    Some(more.max(0.0) / own.max(1e-9))
+        let mut projected = evidence.project_all(&parts);
+        projected.iter_mut().for_each(|p| p.prior = self.prior);
+        let mut set = self.beside.to_vec();
+        set.extend(&projected);
+        let freedoms = ((parts.len() - 1) * self.columns.len()) as f64;
+        let more = evidence.fit(&set).gain - self.together - T.confidence.freedom * freedoms;
+        Some(more.max(0.0) / self.own.max(1e-9))
+    }
 }
 
 /// Whether an effect of a pair of joints is seen on both, 0 to 1: on rows of each the residual must fall by
