@@ -18,6 +18,9 @@ use crate::report::format::percent;
 use crate::report::html::{Section, Tone, page};
 use crate::report::joints;
 
+/// Nothing is wholly sure: the highest confidence in words.
+const SUREST: f64 = 0.999;
+
 /// Verdict in one sentence.
 pub fn sentence(d: &Diagnosis) -> (Tone, String) {
     let claims: Vec<&Finding> = claims(d);
@@ -45,6 +48,14 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             };
             format!("{}{place}{mass}", f.title)
         };
+        let told = |f: &&Finding| match f.same.as_slice() {
+            [] => plain(f),
+            same => format!(
+                "{}, not told from {}",
+                plain(f),
+                same.join(" or ").replace('_', " ")
+            ),
+        };
         match (claims.as_slice(), d.findings.first()) {
             ([], Some(f)) if !f.same.is_empty() => format!(
                 "{} or {}, which these records do not tell apart",
@@ -52,7 +63,7 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                 f.same.join(" or ").replace('_', " ")
             ),
             ([], Some(f)) => format!("{} ({} sure)", plain(&f), percent(f.confidence)),
-            _ => by_effect(&claims, |all| alike(all, sure, plain)),
+            _ => by_effect(&claims, |all| alike(all, sure, told)),
         }
     };
     let held = d.shrink().map(|gone| 1.0 - gone);
@@ -75,9 +86,9 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
     };
     let left = match (d.stays_on.as_slice(), d.friction_found) {
         ([], _) => left,
-        (joints, false) => format!("{left}, and of that of {} more than half", listed(joints)),
+        (joints, false) => format!("{left}. More than half of that of {} stays", listed(joints)),
         (joints, true) => format!(
-            "{left}, and of what friction leaves on {} more than half",
+            "{left}. More than half of what friction leaves on {} stays",
             listed(joints)
         ),
     };
@@ -164,8 +175,7 @@ fn by_effect(claims: &[&Finding], said: impl Fn(&[&Finding]) -> String) -> Strin
 /// One effect at all its places, each with how sure it is unless all are; of many places the least.
 fn alike(all: &[&Finding], sure: bool, plain: impl Fn(&&Finding) -> String) -> String {
     const MANY: usize = 4;
-    // nothing is wholly sure
-    let sure_of = |c: f64| percent(c.min(0.999));
+    let sure_of = |c: f64| percent(c.min(SUREST));
     let confidence = |f: &&Finding| format!("({} sure)", sure_of(f.confidence));
     let place = |f: &&Finding| f.joints.join(" and ");
     let first = &all[0];

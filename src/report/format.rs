@@ -68,6 +68,7 @@ pub fn percent(fraction: f64) -> String {
     let text = match x {
         x if x > 100.0 && x < 100.05 => significant(x, 12),
         x if x >= 1000.0 => format!("{x:.0}"),
+        x if x.abs() < 0.05 => "0.0".to_string(),
         x => format!("{x:.1}"),
     };
     format!("{}{NBSP}%", text.replace('-', "−"))
