@@ -142,15 +142,16 @@ fn stands_out(st: &State, gap: &[f64]) -> bool {
     (0..gap.len()).any(|j| st.stands_out(gap, j))
 }
 
-/// Actuators whose gap is larger than a sound model leaves and stays for the most part, however small it is beside those of others.
+/// Actuators whose gap is far above the noise and stays for the most part, however small it is beside those of others.
 fn staying(st: &State, after: &[f64], before: &[f64]) -> Vec<usize> {
-    let stays = |j: &usize| after[*j] > T.gap.of_joint * before[*j] && st.stands_out(after, *j);
+    let least = T.gap.far * st.evidence.data.fitted as f64;
+    let stays = |j: &usize| after[*j] > (T.gap.of_joint * before[*j]).max(least);
     (0..after.len()).filter(stays).collect()
 }
 
 /// Whether the gap of any joint on records held out is far above the noise.
 fn held_out(st: &State, gap: &[f64]) -> bool {
     let rows = st.evidence.data.rows() - st.evidence.data.fitted;
-    let least = T.gap.held_out * rows as f64;
+    let least = T.gap.far * rows as f64;
     st.evidence.data.predicts() && gap.iter().any(|v| *v > least)
 }

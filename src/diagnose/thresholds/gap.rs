@@ -26,11 +26,11 @@ pub struct Gap {
     pub left: f64,
     /// Share of the gap that may stay in a gap that counts as explained. Unit: share. Source: by hand.
     pub unexplained: f64,
-    /// The same of a single joint. Unit: share. Source: by hand.
+    /// The same of a single joint whose gap is far above the noise (`gap.far`). Unit: share. Source: by hand.
     pub of_joint: f64,
-    /// Gap per row of a joint on records held out from which on the share that stays there counts, too. Unit: noise
-    /// variances. Source: by hand.
-    pub held_out: f64,
+    /// Gap per row of a joint from which on the share that stays there, or on records held out, counts by itself. Unit:
+    /// noise variances. Source: by hand.
+    pub far: f64,
     /// Lags that the autocorrelation of a residual is summed over. Unit: samples. Source: by hand.
     pub lags: usize,
 }
@@ -44,7 +44,7 @@ pub(super) const GAP: Gap = Gap {
     left: 1.0,
     unexplained: 0.15,
     of_joint: 0.5,
-    held_out: 4.0,
+    far: 4.0,
     lags: 20,
 };
 
