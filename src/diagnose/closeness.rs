@@ -98,7 +98,8 @@ fn estimate(evidence: &Evidence, cx: &Context, effects: &[Box<dyn Effect>]) -> C
 }
 
 /// Whether some terms of joints are off: whether the records are likelier with them as unknowns than with the values of the robot file, the
-/// best effect beside either that a refit may absorb, or none. They are not for what a sound model leaves. That one term is off, or those of one joint, is an effect, too.
+/// best effect beside either that a refit may absorb, or none. They are not for what a sound model leaves. That one term is off, or
+/// those of one joint, is an effect, too.
 ///
 /// # Errors
 /// Poses that cannot be reached.

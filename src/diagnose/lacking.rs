@@ -106,12 +106,8 @@ impl Lacking {
 
     /// The robot with it among its unknowns.
     fn opened(&self, plant: &Plant) -> Plant {
-        let joints = plant.robot().joints.iter();
-        let names: Vec<&str> = joints.map(|j| j.name.as_str()).collect();
-        let also = |j: &Joint| {
-            let at = names.iter().position(|name| *name == j.name);
-            JointTerm::ALL
-                .map(|t| j.identify[t as usize] || at.is_some_and(|at| self.of[at][t as usize]))
+        let also = |at: usize, j: &Joint| {
+            JointTerm::ALL.map(|t| j.identify[t as usize] || self.of[at][t as usize])
         };
         plant.clone().identifying(&also)
     }
@@ -134,10 +130,9 @@ impl Lacking {
 
     /// Whether a robot has none of it.
     fn is_left_out(&self, robot: &Robot) -> bool {
-        let all = robot.joints.iter().zip(&self.of);
-        let none =
-            |(j, lacks): (&Joint, &[bool; 4])| (0..4).all(|t| !lacks[t] || j.terms[t] == 0.0);
-        all.into_iter().all(none)
+        let terms = robot.joints.iter().flat_map(|j| j.terms);
+        let mut all = terms.zip(self.of.iter().flatten());
+        all.all(|(value, lacks)| !lacks || value == 0.0)
     }
 
     /// What the report says of it.
@@ -148,45 +143,35 @@ impl Lacking {
             let lack = all.filter(|(_, lacks)| lacks[term as usize]);
             lack.map(|(j, _)| j.name.as_str()).collect()
         };
-        let of = |term: JointTerm, word: &str| match lacks(term) {
-            none if none.is_empty() => None,
-            all if all.len() == joints.len() => Some(word.to_string()),
-            some => Some(format!("{word} of {}", some.join(", "))),
-        };
-        let all = TERMS.map(|t| lacks(t.0).len() == joints.len());
-        let (stated, fitted) = match all {
-            [true, true, false] => (
-                "friction".into(),
-                "viscous and Coulomb friction of each joint".into(),
+        let [viscous, coulomb, offset] = TERMS.map(|t| lacks(t.0));
+        let of_all = |some: &[&str]| some.len() == joints.len();
+        let (stated, fitted, alone) = match of_all(&viscous) && of_all(&coulomb) {
+            true => (
+                "friction".to_string(),
+                "viscous and Coulomb friction",
+                " of each joint",
             ),
-            [true, true, true] => (
-                "friction".into(),
-                "viscous and Coulomb friction and an offset of each joint".into(),
-            ),
-            _ => {
-                let of = [
-                    of(JointTerm::Viscous, "viscous friction"),
-                    of(JointTerm::Coulomb, "Coulomb friction"),
-                ];
-                let stated = of
-                    .into_iter()
-                    .flatten()
-                    .collect::<Vec<_>>()
-                    .join(" and no ");
-                let fitted = if all[2] {
-                    "this and an offset of each joint"
-                } else {
-                    "this"
+            false => {
+                let kinds = [("viscous friction", viscous), ("Coulomb friction", coulomb)];
+                let of = |(kind, some): &(&str, Vec<&str>)| match of_all(some) {
+                    true => kind.to_string(),
+                    false => format!("{kind} of {}", some.join(", ")),
                 };
-                (stated, fitted.to_string())
+                let there = kinds.iter().filter(|(_, some)| !some.is_empty());
+                let stated: Vec<String> = there.map(of).collect();
+                (stated.join(" and no "), "this", "")
             }
+        };
+        let beside = match of_all(&offset) {
+            true => " and an offset of each joint",
+            false => alone,
         };
         Warning::new(
             WarningKind::JointTermsAssumed,
             plant.name(),
             format!(
-                "its file states no {stated}; {fitted} was fitted with its model first, and other effects were looked for \
-                 beside it"
+                "its file states no {stated}; {fitted}{beside} was fitted with its model first, and other effects were looked \
+                 for beside it"
             ),
         )
     }
@@ -200,13 +185,9 @@ fn states(robot: &Robot, term: JointTerm) -> bool {
 /// What a file states of friction and rotors without listing it: of the file of a tree that lists nothing to be identified.
 fn unlisted(plant: &Plant) -> Vec<JointTerm> {
     let listed = |j: &&Joint| j.identify.contains(&true);
-    match !chain::may_lack_friction(plant) || plant.actuators().iter().any(listed) {
-        true => Vec::new(),
-        false => {
-            let all = JointTerm::ALL.into_iter();
-            all.filter(|t| states(plant.robot(), *t)).collect()
-        }
-    }
+    let none = chain::may_lack_friction(plant) && !plant.actuators().iter().any(listed);
+    let all = JointTerm::ALL.into_iter();
+    all.filter(|t| none && states(plant.robot(), *t)).collect()
 }
 
 /// The robot as it is diagnosed, and what was found: the file that the gap is counted from, and what it leaves out.
@@ -234,7 +215,7 @@ pub fn with_friction<'a>(plant: &'a Plant, logs: &[log::Record]) -> Result<AsDia
     };
     // what is taken at its word is no unknown
     let known = |of: Plant| -> Plant {
-        let listed = |j: &Joint| {
+        let listed = |_: usize, j: &Joint| {
             let kept = |t: JointTerm| j.identify[t as usize] && (off || !stated.contains(&t));
             JointTerm::ALL.map(kept)
         };

@@ -48,19 +48,16 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
             };
             format!("{}{place}{mass}", f.title)
         };
-        let told = |f: &&Finding| match f.same.as_slice() {
-            [] => plain(f),
-            same => format!(
-                "{}, not told from {}",
-                plain(f),
-                same.join(" or ").replace('_', " ")
-            ),
+        let same = |f: &&Finding| f.same.join(" or ").replace('_', " ");
+        let told = |f: &&Finding| match f.same.is_empty() {
+            true => plain(f),
+            false => format!("{}, not told from {}", plain(f), same(f)),
         };
         match (claims.as_slice(), d.findings.first()) {
             ([], Some(f)) if !f.same.is_empty() => format!(
                 "{} or {}, which these records do not tell apart",
                 plain(&f),
-                f.same.join(" or ").replace('_', " ")
+                same(&f)
             ),
             ([], Some(f)) => format!("{} ({} sure)", plain(&f), percent(f.confidence)),
             _ => by_effect(&claims, |all| alike(all, sure, told)),

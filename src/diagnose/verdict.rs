@@ -139,7 +139,7 @@ pub fn decide(
 
 /// Whether the gap of any joint is larger than a sound model leaves.
 fn stands_out(st: &State, gap: &[f64]) -> bool {
-    (0..gap.len()).any(|j| st.stands_out(gap, j))
+    st.largest(gap) > T.gap.sound * st.evidence.data.fitted as f64
 }
 
 /// Actuators whose gap is far above the noise and stays for the most part, however small it is beside those of others.

@@ -150,7 +150,7 @@ impl GoughStewart {
             joint.limits = leg.limits;
             joint.terms = leg.terms;
             joint.torque_noise = leg.force_noise;
-            joint.identify = JointTerm::ALL.map(|t| self.identify.contains(&t));
+            joint.identify = JointTerm::mask(&self.identify);
             tree.add(joint);
         }
         for i in 0..6 {

@@ -389,13 +389,13 @@ impl Mechanism {
 
     /// The same mechanism with other terms of its actuators as unknowns.
     pub fn with_terms(self, terms: &[JointTerm]) -> Self {
-        self.identifying(&|_| JointTerm::ALL.map(|t| terms.contains(&t)))
+        self.identifying(&|_, _| JointTerm::mask(terms))
     }
 
     /// The same mechanism with these terms of each of its actuators as unknowns.
-    pub(crate) fn identifying(mut self, terms: &dyn Fn(&Joint) -> [bool; 4]) -> Self {
+    pub(crate) fn identifying(mut self, terms: &dyn Fn(usize, &Joint) -> [bool; 4]) -> Self {
         for &a in &self.actuated {
-            self.robot.joints[a].identify = terms(&self.robot.joints[a]);
+            self.robot.joints[a].identify = terms(a, &self.robot.joints[a]);
         }
         self.parameters.set_terms(&self.robot);
         self

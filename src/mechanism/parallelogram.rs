@@ -262,7 +262,7 @@ pub(super) fn tree(
         joint.limits = chain.limits;
         joint.terms = chain.terms;
         joint.torque_noise = chain.torque_noise;
-        joint.identify = JointTerm::ALL.map(|t| identify.contains(&t));
+        joint.identify = JointTerm::mask(identify);
         tree.add(joint);
     }
     for i in 0..n {

@@ -133,11 +133,11 @@ impl Plant {
 
     /// The same robot with other joint columns in the regressor, the same for every actuator.
     pub fn with_terms(self, terms: &[JointTerm]) -> Self {
-        self.identifying(&|_| JointTerm::ALL.map(|t| terms.contains(&t)))
+        self.identifying(&|_, _| JointTerm::mask(terms))
     }
 
     /// The same robot with these terms of each of its actuators as columns.
-    pub(crate) fn identifying(self, terms: &dyn Fn(&Joint) -> [bool; 4]) -> Self {
+    pub(crate) fn identifying(self, terms: &dyn Fn(usize, &Joint) -> [bool; 4]) -> Self {
         let collisions = self.collisions;
         let other: Plant = match self.mechanism {
             None => self.robot.identifying(terms).into(),

@@ -95,6 +95,11 @@ impl JointTerm {
     pub const FRICTION: [JointTerm; 3] =
         [JointTerm::Coulomb, JointTerm::Viscous, JointTerm::Offset];
 
+    /// Which of all four these are, in the order of [`JointTerm::ALL`].
+    pub(crate) fn mask(terms: &[JointTerm]) -> [bool; 4] {
+        JointTerm::ALL.map(|t| terms.contains(&t))
+    }
+
     /// Name as in `robot.toml`.
     pub fn name(self) -> &'static str {
         match self {

@@ -193,13 +193,13 @@ impl Robot {
 
     /// The same robot with other joint columns in the regressor, the same for every joint.
     pub fn with_terms(self, terms: &[JointTerm]) -> Self {
-        self.identifying(&|_| JointTerm::ALL.map(|t| terms.contains(&t)))
+        self.identifying(&|_, _| JointTerm::mask(terms))
     }
 
-    /// The same robot with these joint columns in the regressor.
-    pub(crate) fn identifying(mut self, terms: &dyn Fn(&Joint) -> [bool; 4]) -> Self {
-        for joint in &mut self.joints {
-            joint.identify = terms(joint);
+    /// The same robot with these columns of each joint in the regressor.
+    pub(crate) fn identifying(mut self, terms: &dyn Fn(usize, &Joint) -> [bool; 4]) -> Self {
+        for (at, joint) in self.joints.iter_mut().enumerate() {
+            joint.identify = terms(at, joint);
         }
         self
     }

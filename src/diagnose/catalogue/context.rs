@@ -120,22 +120,30 @@ impl<'a> Context<'a> {
         (0..self.data.joints()).map(Place::Actuator).collect()
     }
 
-    /// A term of an actuator in the robot file.
+    /// A term of an actuator in the nominal model.
     pub fn stated(&self, place: &Place, term: JointTerm) -> f64 {
         let plant = self.data.plant;
         plant.robot().joints[plant.actuated()[place.first()]].terms[term as usize]
     }
 
-    /// Actuators whose robot file lists no unknown of this kind.
+    /// The whole of a term of which an effect adds a part.
+    pub fn whole(&self, place: &Place, term: JointTerm, eta: &[f64]) -> f64 {
+        self.stated(place, term) + eta[0]
+    }
+
+    /// Actuators whose nominal model has no unknown of this kind.
     pub fn without(&self, term: JointTerm) -> Vec<Place> {
         let actuated = self.data.plant.actuated();
-        let listed = |joint: usize| {
-            let parameters = &self.data.parameters;
-            let own = plant::Column::Term { joint, term };
-            parameters.iter().any(|p| p.kind == own)
-        };
-        let all = self.singles().into_iter();
-        all.filter(|place| !listed(actuated[place.first()]))
+        self.singles()
+            .into_iter()
+            .filter(|place| {
+                let joint = actuated[place.first()];
+                !self
+                    .data
+                    .parameters
+                    .iter()
+                    .any(|p| p.kind == plant::Column::Term { joint, term })
+            })
             .collect()
     }
 

@@ -38,7 +38,7 @@ impl Effect for CoulombFriction {
     }
 
     fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > -cx.stated(place, JointTerm::Coulomb)
+        cx.whole(place, JointTerm::Coulomb, eta) > 0.0
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -46,7 +46,7 @@ impl Effect for CoulombFriction {
             place, eta, std, ..
         } = e;
         let unit = cx.torque_unit(place.first());
-        let whole = cx.stated(place, JointTerm::Coulomb) + eta[0];
+        let whole = cx.whole(place, JointTerm::Coulomb, eta);
         vec![value("coulomb_friction", whole, std[0], unit)]
     }
 }

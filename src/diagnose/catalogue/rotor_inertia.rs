@@ -38,7 +38,7 @@ impl Effect for RotorInertia {
     }
 
     fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > -cx.stated(place, JointTerm::Armature)
+        cx.whole(place, JointTerm::Armature, eta) > 0.0
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -46,7 +46,7 @@ impl Effect for RotorInertia {
             place, eta, std, ..
         } = e;
         let unit = cx.unit(place.first(), Quantity::Inertia);
-        let whole = cx.stated(place, JointTerm::Armature) + eta[0];
+        let whole = cx.whole(place, JointTerm::Armature, eta);
         vec![value("rotor_inertia", whole, std[0], unit)]
     }
 }

@@ -42,7 +42,7 @@ impl Effect for TorqueOffset {
             place, eta, std, ..
         } = e;
         let unit = cx.torque_unit(place.first());
-        let whole = cx.stated(place, JointTerm::Offset) + eta[0];
+        let whole = cx.whole(place, JointTerm::Offset, eta);
         vec![value("torque_offset", whole, std[0], unit)]
     }
 }

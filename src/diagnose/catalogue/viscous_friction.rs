@@ -38,7 +38,7 @@ impl Effect for ViscousFriction {
     }
 
     fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > -cx.stated(place, JointTerm::Viscous)
+        cx.whole(place, JointTerm::Viscous, eta) > 0.0
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -46,7 +46,7 @@ impl Effect for ViscousFriction {
             place, eta, std, ..
         } = e;
         let unit = cx.unit(place.first(), Quantity::Damping);
-        let whole = cx.stated(place, JointTerm::Viscous) + eta[0];
+        let whole = cx.whole(place, JointTerm::Viscous, eta);
         vec![value("viscous_friction", whole, std[0], unit)]
     }
 }

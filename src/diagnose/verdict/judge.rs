@@ -27,7 +27,8 @@ pub struct Member {
     /// the most that a decoy gains of its own, over what the effect gains; not of an effect that shows in
     /// parameters alone
     pub decoys: Option<f64>,
-    /// what coefficients of their own for every fitted record gain, over what the effect gains; not of an effect that remembers, nor of whole sets of inertial parameters that show in parameters alone
+    /// what coefficients of their own for every fitted record gain, over what the effect gains; not of an
+    /// effect that remembers, nor of whole sets of inertial parameters that show in parameters alone
     pub unsteady: Option<f64>,
     /// the same with coefficients of their own for every actuator, of an effect that should be the same on all
     pub uneven: Option<f64>,
@@ -60,7 +61,6 @@ pub fn judge(
         let moved = (columns.as_slice(), &c.projected);
         decoy::largest(evidence, moved, &c.eta, &beside, m.gain)
     });
-    // whole sets of inertial parameters fit anything in a single record
     let alike = Alike {
         columns: &columns,
         prior: effect.prior(),
@@ -68,6 +68,7 @@ pub fn judge(
         together: m.with.gain,
         own: m.gain,
     };
+    // whole sets of inertial parameters fit anything in a single record
     let unsteady = match st.remembers(c) || m.frozen && columns.len() > T.hidden.columns {
         true => None,
         false => alike.unsteady(evidence),

@@ -35,7 +35,7 @@ fn taken_and_fall(r0: &[Vec<f64>], r1: &[Vec<f64>], rows: Range<usize>) -> [f64;
 /// An effect beside others of a set, and what it gains there.
 pub struct Alike<'a> {
     pub columns: &'a [Column],
-    /// deviation of its coefficients a priori
+    /// information on its coefficients a priori
     pub prior: f64,
     /// the others
     pub beside: &'a [&'a Projected],
@@ -51,42 +51,41 @@ impl Alike<'_> {
     pub fn unsteady(&self, evidence: &Evidence) -> Option<f64> {
         let data = evidence.data;
         let fitted = (0..data.records.len()).filter(|k| data.records[*k].fit);
-        let parts = fitted.map(|k| {
-            self.only(|v| {
+        self.apart(evidence, &fitted.collect::<Vec<_>>(), |column, k| {
+            let rows = column.rows.iter().map(|(j, v)| {
                 let mut part = vec![0.0; v.len()];
                 part[data.span(k)].copy_from_slice(&v[data.span(k)]);
-                part
-            })
-        });
-        self.apart(evidence, parts.collect())
+                (*j, part)
+            });
+            rows.collect()
+        })
     }
 
     /// The same with coefficients of its own on every actuator.
     pub fn uneven(&self, evidence: &Evidence) -> Option<f64> {
-        let on = |j: usize| -> Vec<Column> {
-            let rows = |c: &Column| c.rows.iter().filter(|(i, _)| *i == j).cloned().collect();
-            self.columns
-                .iter()
-                .map(|c| Column { rows: rows(c) })
-                .collect()
-        };
-        self.apart(evidence, (0..evidence.data.joints()).map(on).collect())
+        let joints: Vec<usize> = (0..evidence.data.joints()).collect();
+        self.apart(evidence, &joints, |column, j| {
+            let own = column.rows.iter().filter(|(i, _)| *i == j);
+            own.cloned().collect()
+        })
     }
 
-    /// Its columns with other values.
-    fn only(&self, part: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Column> {
-        let of = |c: &Column| Column {
-            rows: c.rows.iter().map(|(j, v)| (*j, part(v))).collect(),
-        };
-        self.columns.iter().map(of).collect()
-    }
-
-    /// What parts with coefficients of their own gain beyond the whole.
-    fn apart(&self, evidence: &Evidence, parts: Vec<Vec<Column>>) -> Option<f64> {
+    /// What parts with coefficients of their own gain beyond the whole; `rows` are those of a column in one of them.
+    fn apart(
+        &self,
+        evidence: &Evidence,
+        parts: &[usize],
+        rows: impl Fn(&Column, usize) -> Vec<(usize, Vec<f64>)>,
+    ) -> Option<f64> {
         if parts.len() < 2 {
             return None;
         }
-        let mut projected = evidence.project_all(&parts);
+        let of = |k: &usize| -> Vec<Column> {
+            let columns = self.columns.iter();
+            columns.map(|c| Column { rows: rows(c, *k) }).collect()
+        };
+        let apart: Vec<Vec<Column>> = parts.iter().map(of).collect();
+        let mut projected = evidence.project_all(&apart);
         projected.iter_mut().for_each(|p| p.prior = self.prior);
         let mut set = self.beside.to_vec();
         set.extend(&projected);

@@ -108,11 +108,6 @@ impl State<'_> {
         joints.map(|(v, allowed)| v / allowed).fold(0.0, f64::max)
     }
 
-    /// Whether the gap of an actuator is larger than a sound model leaves.
-    pub fn stands_out(&self, gap: &[f64], joint: usize) -> bool {
-        gap[joint] / self.allowance[joint] > T.gap.sound * self.evidence.data.fitted as f64
-    }
-
     /// Gap of all actuators above what a sound model leaves.
     pub fn above(&self, gap: &[f64], fitted: bool) -> f64 {
         let data = self.evidence.data;
