@@ -83,7 +83,7 @@ class Model:
         )
         self._driven = any(not native for _, _, native in getattr(self._effects, "DRIVES", []))
         #: what goes on from one record to the next, and its state where each record begins
-        self.lasting: List[str] = list(getattr(self._effects, "LASTING", []))
+        self.lasting: Dict[str, float] = dict(getattr(self._effects, "LASTING", []))
         self.begins: Dict[int, Dict[str, Any]] = {}
         #: whether something in it goes on by itself, so that a run needs a time before it
         self.remembers = self._model.nv > len(states) or bool(getattr(self._effects, "REMEMBERED", []))
@@ -133,7 +133,11 @@ class Model:
 
     def _begin(self, memory: Dict[str, Any], q: Array) -> None:
         """Starts a memory anew but for what lasts."""
-        memory.update({**self._effects.start(q), **{k: memory[k] for k in self.lasting if k in memory}})
+        memory.update({**self._effects.start(q), **self._kept(memory)})
+
+    def _kept(self, memory: Dict[str, Any]) -> Dict[str, Any]:
+        """What a pause leaves of what lasts."""
+        return {key: share * memory[key] for key, share in self.lasting.items() if key in memory}
 
     def _gains(self) -> Array:
         """Torque of every joint by the signal of its actuator."""
@@ -146,7 +150,7 @@ class Model:
         out = {}
         for k in sorted(range(len(records)), key=lambda k: int(records[k]["order"])):
             r = records[k]
-            self.begins[int(r["order"])] = {key: memory[key] for key in self.lasting if key in memory}
+            self.begins[int(r["order"])] = self._kept(memory)
             if self._closed:
                 x, v, a = (from_columns(r[f"tree_{n}"], len(self._tree)) for n in ("q", "dq", "ddq"))
                 out[k] = self.closing(x, v, a, r["dt"], memory)

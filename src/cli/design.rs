@@ -169,6 +169,7 @@ pub fn run(args: Args) -> Result<()> {
         starts: args.starts,
         time_limit: args.time_limit,
         threads: args.threads,
+        ..Settings::default()
     };
     settings.check(plant.moved())?;
     if let Some(question) = args.question {

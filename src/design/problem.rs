@@ -86,6 +86,7 @@ impl Problem<'_> {
             basis: self.basis,
             task: &task,
             seed: settings.seed,
+            rough: settings.rough,
         };
         let mut search = Search::default();
         pool.install(|| -> Result<()> {

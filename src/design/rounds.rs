@@ -66,7 +66,7 @@ impl Search {
                 }
                 let stop = Stop {
                     iterations: 120,
-                    gain: 1e-2,
+                    gain: if source.rough { 5e-2 } else { 1e-2 },
                 };
                 it.run(task, Phase::Smooth(NORMS.0), stop, halt)?;
                 Ok(Some((number, it, false)))
@@ -76,7 +76,7 @@ impl Search {
         begun.sort_by(|a, b| a.1.value.total_cmp(&b.1.value).then(a.0.cmp(&b.0)));
         begun
             .par_iter_mut()
-            .take(ROUND.1)
+            .take(if source.rough { 0 } else { ROUND.1 })
             .try_for_each(|(_, it, done)| -> Result<()> {
                 let stop = Stop {
                     iterations: 150,

@@ -49,6 +49,9 @@ pub struct Settings {
     /// threads; 0 for one per core (not written to files: the result does not depend on it)
     #[serde(skip_serializing)]
     pub threads: usize,
+    /// the first feasible start and its first phase, for a motion that others begin from
+    #[serde(skip)]
+    pub(crate) rough: bool,
 }
 
 crate::settings::changeable!(Settings);
@@ -71,6 +74,7 @@ impl Default for Settings {
             starts: None,
             time_limit: None,
             threads: 0,
+            rough: false,
         }
     }
 }

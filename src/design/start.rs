@@ -47,6 +47,8 @@ pub struct Source<'a> {
     pub task: &'a Task<'a>,
     /// seed of the design
     pub seed: u64,
+    /// the first feasible start and the first phase will do
+    pub rough: bool,
 }
 
 /// Coefficients of a joint that stands still.
@@ -77,7 +79,7 @@ impl Source<'_> {
         let mut e = Evaluation::default();
         let mut best: Option<(f64, Vec<f64>)> = None;
         for _ in 0..candidates {
-            if best.is_some() && halt() {
+            if best.is_some() && (self.rough || halt()) {
                 break;
             }
             let (x, rest) = self.candidate(&mut rng);

@@ -95,7 +95,18 @@ impl Finding {
     }
 }
 
-/// Members and rivals of a decision, by falling confidence; `seed` is that of the intervals.
+/// By falling confidence, none of which is above what names turned out to be right; equal ones by what they explain.
+pub fn order(findings: &mut [Finding]) {
+    for f in findings.iter_mut() {
+        f.confidence = f.confidence.min(T.confidence.most);
+    }
+    findings.sort_by(|a, b| {
+        let sure = b.confidence.total_cmp(&a.confidence);
+        sure.then(b.explains.total_cmp(&a.explains))
+    });
+}
+
+/// Members and rivals of a decision, in their [`order`]; `seed` is that of the intervals.
 pub fn findings(
     evidence: &Evidence,
     cx: &Context,
@@ -105,7 +116,7 @@ pub fn findings(
 ) -> Vec<Finding> {
     let mut all = members(evidence, cx, effects, decision, seed);
     rivals(&mut all, cx, effects, decision);
-    all.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    order(&mut all);
     all
 }
 

@@ -459,7 +459,6 @@ impl Beyond<'_> {
                 ..Finding::of(self.cx, *effect, fitted)
             });
         }
-        out.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
         out
     }
 }
@@ -497,7 +496,7 @@ impl Lacked {
             f.holdout = f.holdout.map(|h| h * self.others[1]);
         }
         let claimed = self.findings.iter().any(Finding::is_claim);
-        findings.splice(0..0, self.findings.iter().cloned());
+        findings.extend(self.findings.iter().cloned());
         match verdict {
             Verdict::NoGap if claimed => Verdict::Explained,
             Verdict::Unknown if claimed => Verdict::PartlyExplained,

@@ -288,7 +288,8 @@ fn of_plant<'a>(
         (true, None) => honest,
         (true, Some(load)) => {
             let body = finding::carried(&evidence, &cx, &phi_after, load, effects.as_slice());
-            findings.splice(0..0, body);
+            findings.extend(body);
+            finding::order(&mut findings);
             match honest {
                 Verdict::NoGap => Verdict::Explained,
                 Verdict::Unknown => Verdict::PartlyExplained,
@@ -312,6 +313,7 @@ fn of_plant<'a>(
         }
         None => verdict,
     };
+    finding::order(&mut findings);
     warnings.extend(file.map(|(file, lacking)| lacking.warning(file)));
     let (holdout, unexplained) = match &lacked {
         Some(l) => (l.holdout, l.unexplained),

@@ -25,7 +25,7 @@ use super::finding::Finding;
 use super::search::Candidate;
 use super::settings::Settings;
 use super::thresholds::THRESHOLDS as T;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Fourier, Trajectory};
 use motions::Motions;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -221,9 +221,13 @@ fn improved(
             .into_par_iter()
             .with_max_len(1)
             .filter_map(|motion| {
+                let overlap = |f: &Fourier| trial.overlaps(f, COARSE, &[target])[0];
+                // the limits take longer to look at, and only shrink it
+                if overlap(&motion).is_some_and(|o| o >= lowest) {
+                    return None;
+                }
                 let t = motions.kept(motion)?;
-                let o = trial.overlaps(&t.fourier, COARSE, &[target])[0]?;
-                Some((o, t))
+                Some((overlap(&t.fourier)?, t))
             })
             .collect::<Vec<_>>()
             .into_iter()

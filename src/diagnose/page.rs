@@ -18,9 +18,6 @@ use crate::report::format::percent;
 use crate::report::html::{Section, Tone, page};
 use crate::report::joints;
 
-/// Nothing is wholly sure: the highest confidence in words.
-const SUREST: f64 = 0.999;
-
 /// Verdict in one sentence.
 pub fn sentence(d: &Diagnosis) -> (Tone, String) {
     let claims: Vec<&Finding> = claims(d);
@@ -172,8 +169,7 @@ fn by_effect(claims: &[&Finding], said: impl Fn(&[&Finding]) -> String) -> Strin
 /// One effect at all its places, each with how sure it is unless all are; of many places the least.
 fn alike(all: &[&Finding], sure: bool, plain: impl Fn(&&Finding) -> String) -> String {
     const MANY: usize = 4;
-    let sure_of = |c: f64| percent(c.min(SUREST));
-    let confidence = |f: &&Finding| format!("({} sure)", sure_of(f.confidence));
+    let confidence = |f: &&Finding| format!("({} sure)", percent(f.confidence));
     let place = |f: &&Finding| f.joints.join(" and ");
     let first = &all[0];
     match (all, sure) {
@@ -197,7 +193,7 @@ fn alike(all: &[&Finding], sure: bool, plain: impl Fn(&&Finding) -> String) -> S
                 "{} on {} (each at least {} sure)",
                 first.title,
                 listed(&places),
-                sure_of(least)
+                percent(least)
             )
         }
     }

@@ -129,8 +129,14 @@ pub struct Function {
     pub body: Vec<String>,
     /// memory before the first sample, an expression in the position `q`
     pub start: Option<String>,
-    /// whether the memory goes on from one record to the next
-    pub lasts: bool,
+    /// share of the memory that goes on from one record to the next
+    pub lasts: f64,
+}
+
+/// A polynomial of the position, constant first.
+pub(crate) fn cubic(coefficients: [f64; 4]) -> String {
+    let [a, b, c, d] = coefficients.map(py);
+    format!("{a} + q * ({b} + q * ({c} + q * {d}))")
 }
 
 /// A number as Python reads it, in brackets below zero.
@@ -170,7 +176,7 @@ impl Element {
             width,
             body,
             start: None,
-            lasts: false,
+            lasts: 0.0,
         })
     }
 
@@ -179,7 +185,7 @@ impl Element {
         joint: usize,
         width: f64,
         start: &str,
-        lasts: bool,
+        lasts: f64,
         body: Vec<String>,
     ) -> Element {
         Element::Function(Function {
@@ -200,7 +206,7 @@ impl Element {
             width: 1.0,
             body,
             start: None,
-            lasts: false,
+            lasts: 0.0,
         })
     }
 
@@ -219,11 +225,7 @@ impl Element {
             Element::Spring {
                 joint,
                 coefficients,
-            } => {
-                let [a, b, c, d] = coefficients.map(py);
-                let torque = format!("{a} + q * ({b} + q * ({c} + q * {d}))");
-                Element::smooth(joint, width, torque)
-            }
+            } => Element::smooth(joint, width, cubic(coefficients)),
             other => other,
         }
     }

@@ -150,8 +150,8 @@ pub(super) fn examine(
             WarningKind::UnitSuspect,
             &claims[k].column,
             format!(
-                "as the position of {} it goes from {:.3} to {:.3}, beyond its limits: another unit, another zero or \
-                 another joint",
+                "as the position of {} it goes from {:.3} to {:.3}, beyond the limits of the robot file: another unit, another \
+                 zero, another joint, or limits that are narrower than the robot's",
                 claims[k].joint.clone().unwrap_or_default(),
                 range[0],
                 range[1]

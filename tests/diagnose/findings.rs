@@ -201,31 +201,60 @@ fn stribeck_friction_of_another_formula() {
     assert!(v.value > 0.02 && v.value < 0.25, "{}", v.value);
 }
 
-#[test]
-fn hysteresis_of_a_lugre_joint() {
-    let mut z = [0.0f64; 2];
+/// LuGre friction of the first joint in steps of its own, in the place of Coulomb friction of 1.65 N m: `rise` over it below a
+/// Stribeck velocity of 0.08 rad/s, and bristles of a `stiffness` in N m/rad.
+fn lugre(stiffness: f64, rise: f64) -> Diagnosis {
+    let mut z = 0.0f64;
     let mut last = -1.0;
-    let d = run(&mut |j, t, _, v, _| {
+    run(&mut |j, t, _, v, _| {
         if j != 0 {
             return 0.0;
         }
         if t < last {
-            z = [0.0; 2];
+            z = 0.0;
         }
         last = t;
-        // LuGre in steps of its own, Coulomb 1.65 replaced by the bristles
+        let level = 1.65 + rise * (-(v[0] / 0.08).powi(2)).exp();
         let steps = 20;
+        let h = 1.0 / (RATE * steps as f64);
         for _ in 0..steps {
-            z[0] += (v[0] - 40.0 * v[0].abs() * z[0] / 1.65) / (RATE * steps as f64);
+            // exact at a constant velocity
+            let steady = level / stiffness * v[0].signum();
+            z = steady + (z - steady) * (-stiffness * v[0].abs() / level * h).exp();
         }
-        40.0 * z[0] - 1.65 * v[0].signum()
-    });
+        stiffness * z - 1.65 * v[0].signum()
+    })
+}
+
+#[test]
+fn hysteresis_of_a_lugre_joint() {
+    let d = lugre(40.0, 0.0);
     assert_eq!(
         claims(&d).first(),
         Some(&("presliding_hysteresis", vec![0])),
         "{:?}",
         claims(&d)
     );
+}
+
+#[test]
+fn stribeck_friction_of_a_lugre_joint() {
+    // bristles that bend by 0.1 and by 1 mrad before they slip
+    for stiffness in [16_500.0, 1650.0] {
+        let d = lugre(stiffness, 0.6);
+        assert_eq!(claims(&d), [("stribeck_friction", vec![0])]);
+        let f = &d.findings[0];
+        let value = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);
+        let near = |name: &str, truth: f64, off: f64| {
+            let found = value(name).unwrap_or_else(|| panic!("no {name}"));
+            println!("{name}: {found:.4} (simulated {truth:.4})");
+            assert!((found / truth - 1.0).abs() < off, "{name}: {found} {truth}");
+        };
+        near("rise", 0.6, 0.3);
+        near("stribeck_velocity", 0.08, 0.3);
+        near("presliding", 1.65 / stiffness, 0.5);
+        assert!(f.explains > 0.9, "{}", f.explains);
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! A cable or hose pulls on one joint: a static torque over its position.
 
+use super::bristles::Bristles;
 use super::*;
+use crate::export::element::cubic;
 use crate::report::format::significant;
 
 /// Cable or hose spring.
@@ -10,14 +12,18 @@ pub struct CableSpring;
 const LINEAR: u8 = 0;
 /// Up to the third power.
 const CUBIC: u8 = 1;
+/// The same of a hose that rubs, with friction that builds up over a displacement.
+const RUBS: u8 = 2;
+/// These displacements, over the range of the motion.
+const REACH: [f64; 2] = [0.01, 0.15];
 
 impl Effect for CableSpring {
     fn card(&self) -> Card {
         Card {
             name: "cable_spring",
             title: "cable or hose spring",
-            equation: "f(q): k (q − q₀), and of higher order",
-            source: "Siciliano & Khatib 2016, ch. 9",
+            equation: "f(q): k (q − q₀), and of higher order; where it rubs, F z beside it, ż = q̇/s (1 − z sgn q̇)",
+            source: "Siciliano & Khatib 2016, ch. 9; Dahl 1968",
             aliases: &["counterbalance"],
             separated_by: "slow full range with and without the dress pack",
         }
@@ -30,12 +36,20 @@ impl Effect for CableSpring {
         cx.singles()
     }
 
-    fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
-        vec![Shape::new(LINEAR, &[]), Shape::new(CUBIC, &[])]
+    fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
+        let [a, b] = cx.data.range[place.first()];
+        let reaches = ladder(REACH[0] * (b - a), REACH[1] * (b - a), 4);
+        let rubs = reaches.into_iter().map(|s| Shape::new(RUBS, &[s]));
+        let smooth = [LINEAR, CUBIC].map(|form| Shape::new(form, &[]));
+        smooth.into_iter().chain(rubs).collect()
     }
 
     fn forms(&self) -> u8 {
-        2
+        3
+    }
+
+    fn refinable(&self, _k: usize) -> bool {
+        true
     }
 
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
@@ -45,16 +59,24 @@ impl Effect for CableSpring {
         // Σ η_p ((q − m)/h)^p in powers of q
         let mut coefficients = [0.0; 4];
         let mut power = [1.0, 0.0, 0.0, 0.0];
-        for eta in &e.eta {
+        for eta in e.eta.iter().take(4) {
             let sum = coefficients.iter_mut().zip(power);
             sum.for_each(|(c, p)| *c += eta * p);
             let lower = [0.0, power[0], power[1], power[2]];
             power = std::array::from_fn(|k| (lower[k] - middle * power[k]) / half);
         }
-        Some(Element::Spring {
-            joint,
-            coefficients,
-        })
+        if e.shape.form != RUBS {
+            return Some(Element::Spring {
+                joint,
+                coefficients,
+            });
+        }
+        let pull = cubic(coefficients);
+        let rubs = py(e.eta[4]);
+        let (start, mut lines) = Bristles::lines(0, e.shape[0]);
+        lines.push(format!("return 0.0 * q, {pull} + {rubs} * z, memory"));
+        let width = 1e-3 * cx.data.speed[joint];
+        Some(Element::memory(joint, width, &start, 0.0, lines))
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
@@ -62,15 +84,26 @@ impl Effect for CableSpring {
         let [a, b] = cx.data.range[j];
         let (middle, half) = (0.5 * (a + b), (0.5 * (b - a)).max(1e-9));
         let order = if shape.form == LINEAR { 1 } else { 3 };
-        (0..=order)
-            .map(|p| Column::on(j, cx.data.own(j, |q, _| ((q - middle) / half).powi(p))))
-            .collect()
+        let power = |p| Column::on(j, cx.data.own(j, |q, _| ((q - middle) / half).powi(p)));
+        let mut all: Vec<Column> = (0..=order).map(power).collect();
+        if shape.form == RUBS {
+            all.push(Column::on(
+                j,
+                Bristles::column(cx, j, 0, shape[0], |z, _| z),
+            ));
+        }
+        all
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, shape: &Shape, eta: &[f64]) -> bool {
         // a spring: the pull changes over the range, it is no mere offset
         let varies = eta[1..].iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        varies > 0.15 * eta[0].abs() || shape.form == CUBIC
+        match shape.form {
+            LINEAR => varies > 0.15 * eta[0].abs(),
+            CUBIC => true,
+            // it is the spring that rubs
+            _ => eta[4] > 0.0 && eta[1] + eta[3] > eta[4],
+        }
     }
 
     fn impossible(
@@ -115,9 +148,14 @@ impl Effect for CableSpring {
             0.5 * (a + b),
             cx.unit(j, Quantity::Position),
         ));
-        if shape.form == CUBIC {
+        if shape.form != LINEAR {
             all.push(value("quadratic_part", eta[2], std[2], cx.torque_unit(j)));
             all.push(value("cubic_part", eta[3], std[3], cx.torque_unit(j)));
+        }
+        if shape.form == RUBS {
+            all.push(value("level", eta[4], std[4], cx.torque_unit(j)));
+            let way = cx.unit(j, Quantity::Position);
+            all.push(constant("presliding", shape[0], way));
         }
         all
     }

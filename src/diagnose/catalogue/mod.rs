@@ -9,6 +9,7 @@
 
 mod backlash;
 mod base_compliance;
+mod bristles;
 mod cable_spring;
 mod cogging;
 mod context;

@@ -5,10 +5,8 @@ use super::*;
 /// Thermal friction.
 pub struct ThermalFriction;
 
-/// Warmth lasts from record to record.
-const LASTS: u8 = 0;
-/// Every record begins cold.
-const COLD: u8 = 1;
+/// Shares of the warmth that are left when the next record begins: all, of pauses, or none.
+const KEPT: [f64; 4] = [1.0, 0.65, 0.35, 0.0];
 
 impl Effect for ThermalFriction {
     fn card(&self) -> Card {
@@ -26,13 +24,12 @@ impl Effect for ThermalFriction {
     }
 
     fn shapes(&self, _cx: &Context, _place: &Place) -> Vec<Shape> {
-        // time constant, how far it saturates
+        // time constant, how far it saturates, what a pause leaves
         let mut all = Vec::new();
         for time in [5.0, 15.0, 40.0, 100.0, 300.0] {
             for bend in [0.0, 3.0, 8.0] {
-                all.push(Shape::new(LASTS, &[time, bend]));
+                all.extend(KEPT.map(|kept| Shape::of(&[time, bend, kept])));
             }
-            all.push(Shape::new(COLD, &[time, 0.0]));
         }
         all
     }
@@ -44,10 +41,6 @@ impl Effect for ThermalFriction {
     fn remembers(&self) -> bool {
         // how warm a record begins
         true
-    }
-
-    fn forms(&self) -> u8 {
-        2
     }
 
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
@@ -69,15 +62,15 @@ impl Effect for ThermalFriction {
             j,
             T.reversals.sharp * top,
             "0.0 * q",
-            e.shape.form == LASTS,
+            e.shape[2],
             lines,
         ))
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
-        // warmth from the power of friction; it lasts from record to record in the order of the
-        // experiment, or every record starts cold
+        // warmth from the power of friction; what a pause leaves of it goes from record to record in the order of the
+        // experiment
         let (top, [fc, fv]) = (cx.data.speed[j], heating(cx, j));
         let power = |v: f64| (fc * v.abs() / top + fv * (v / top).powi(2)) / (fc + fv);
         let mut order: Vec<usize> = (0..cx.data.records.len()).collect();
@@ -86,9 +79,7 @@ impl Effect for ThermalFriction {
         let mut warm = 0.0;
         for k in order {
             let r = &cx.data.records[k];
-            if shape.form == COLD {
-                warm = 0.0;
-            }
+            warm *= shape[2];
             let (_, v) = r.state(j);
             for (to, v) in warmth[cx.data.span(k)].iter_mut().zip(v) {
                 warm += r.dt / shape[0] * (power(*v) - warm);
@@ -122,7 +113,7 @@ impl Effect for ThermalFriction {
             ),
             value("viscous_change", eta[1], std[1], unit),
             constant("time_constant", shape[0], "s"),
-            constant("lasts_over_records", f64::from(shape.form == LASTS), ""),
+            constant("lasts_over_records", shape[2], ""),
         ]
     }
 }

@@ -74,6 +74,8 @@ impl<'a> Motions<'a> {
                 seed: seed + k as u64,
                 starts: Some(1),
                 ends: Ends::Free,
+                // random steps go on from here, towards another criterion
+                rough: true,
                 ..Design::default()
             };
             // a robot that no motion of this period suits may have others

@@ -1,6 +1,6 @@
 //! Which effects were found, and how far the gap shrinks with them.
 
-use super::{Diagnosis, SUREST};
+use super::Diagnosis;
 use crate::diagnose::finding::Finding;
 use crate::diagnose::verdict::Verdict;
 use crate::report::format::{percent, significant};
@@ -21,7 +21,7 @@ pub(super) fn effects(d: &Diagnosis) -> Markup {
                 div class="code" { (f.equation) }
             },
             html! { @if f.joints.is_empty() { "whole robot" } @else { (f.joints.join(", ")) } },
-            html! { (percent(f.confidence.min(SUREST))) },
+            html! { (percent(f.confidence)) },
             html! { (percent(f.explains)) @if f.member { div { small { (percent(f.interval[0])) "–" (percent(f.interval[1])) } } } },
             html! { (held(f)) },
             html! { (percent(f.visibility)) @if f.frozen { div { small { "against the prior" } } } },

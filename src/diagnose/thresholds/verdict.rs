@@ -75,6 +75,8 @@ pub(super) const MATTERS: Matters = Matters {
 pub struct Confidence {
     /// Confidence from which a finding is a claim. Unit: 0 to 1. Source: by hand: even odds.
     pub claim: f64,
+    /// Largest confidence of a finding. Unit: 0 to 1. Source: of names above 0.95, 98 % were right in 300 withheld cases.
+    pub most: f64,
     /// Gain per row. Unit: noise variances. Source: by hand.
     pub gain: Gate,
     /// Fall of the prior's penalty, for a hidden effect. Unit: −2 ln p. Source: by hand.
@@ -135,6 +137,7 @@ pub struct Confidence {
 
 pub(super) const CONFIDENCE: Confidence = Confidence {
     claim: 0.5,
+    most: 0.99,
     gain: gate(GAIN, 0.02),
     surprise: gate(SURPRISE, 12.0),
     predicts: HALF,

@@ -181,7 +181,7 @@ pub fn functions(model: &Model) -> Result<String> {
             &tables.remembered,
         ),
         (
-            "keys of memories that go on from one record to the next",
+            "keys of memories that go on from one record to the next, share that does",
             "LASTING",
             &tables.lasting,
         ),
@@ -263,8 +263,8 @@ fn add(
             *functions += &body(lines);
             let asks = matches!(kind, Kind::Torque | Kind::Memory);
             tables.loaded |= asks && lines.iter().any(|l| l.contains("load"));
-            if *lasts {
-                tables.lasting.push(format!("\"{name}\""));
+            if *lasts > 0.0 {
+                tables.lasting.push(format!("(\"{name}\", {})", py(*lasts)));
             }
             match kind {
                 Kind::Torque => tables.added.push(format!("({joint}, {name})")),
