@@ -119,7 +119,10 @@ impl Checker {
     }
 
     /// Whether the actuators keep their limits at samples of a period: cheap, and necessary.
-    fn sampled(&self, fourier: &Fourier) -> Result<bool> {
+    ///
+    /// # Errors
+    /// A motion of another robot.
+    pub(crate) fn sampled(&self, fourier: &Fourier) -> Result<bool> {
         let motion = fourier.motion(SAMPLES);
         let (moved, tau) = match self.plant.actuator_motion(&motion) {
             Ok(moved) => (moved, self.plant.nominal_torque(&motion)?),
@@ -143,7 +146,7 @@ impl Checker {
         }))
     }
 
-    /// Whether a motion keeps all of them.
+    /// Whether a motion keeps all of them, and what it may not touch.
     ///
     /// # Errors
     /// A motion of another robot.
@@ -151,13 +154,13 @@ impl Checker {
         if !self.sampled(fourier)? {
             return Ok(false);
         }
-        let limits = self.plant.certify_limits(fourier, self.derate);
-        let all = limits.and_then(|found| match found.satisfied() {
-            true => self.plant.certify(fourier, self.derate),
-            false => Ok(found),
-        });
-        match all {
-            Ok(certified) => Ok(certified.satisfied()),
+        match self.plant.certify_limits(fourier, self.derate) {
+            // collisions take longer to look at
+            Ok(found) if found.satisfied() => {
+                let clearance = self.plant.clearance(fourier)?;
+                Ok(clearance.is_none_or(|c| c.satisfied))
+            }
+            Ok(_) => Ok(false),
             // out of reach
             Err(Error::Infeasible(_)) => Ok(false),
             Err(e) => Err(e),

@@ -25,7 +25,7 @@ use super::finding::Finding;
 use super::search::Candidate;
 use super::settings::Settings;
 use super::thresholds::THRESHOLDS as T;
-use crate::trajectory::{Fourier, Trajectory};
+use crate::trajectory::Trajectory;
 use motions::Motions;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -221,13 +221,11 @@ fn improved(
             .into_par_iter()
             .with_max_len(1)
             .filter_map(|motion| {
-                let overlap = |f: &Fourier| trial.overlaps(f, COARSE, &[target])[0];
-                // the limits take longer to look at, and only shrink it
-                if overlap(&motion).is_some_and(|o| o >= lowest) {
-                    return None;
-                }
-                let t = motions.kept(motion)?;
-                Some((overlap(&t.fourier)?, t))
+                // the proof of the limits takes longer
+                motions.kept(motion, |f| {
+                    let overlap = trial.overlaps(f, COARSE, &[target])[0];
+                    overlap.filter(|o| *o < lowest)
+                })
             })
             .collect::<Vec<_>>()
             .into_iter()

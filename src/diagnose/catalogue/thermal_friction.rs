@@ -35,7 +35,7 @@ impl Effect for ThermalFriction {
     }
 
     fn refinable(&self, k: usize) -> bool {
-        k == 0
+        k < 2
     }
 
     fn remembers(&self) -> bool {

@@ -130,9 +130,23 @@ impl<'a> Motions<'a> {
         motion
     }
 
-    /// A changed motion shrunk about its middle until all limits hold; `None` where that fails.
-    pub fn kept(&self, motion: Fourier) -> Option<Trajectory> {
-        Some(self.trajectory(self.inside(motion, T.motions.often[1])?))
+    /// A changed motion shrunk about its middle until all limits hold, with its `figure`; `None` where that fails, or no figure
+    /// is there when the limits of the actuators hold at samples. Those take less time to look at than the proof and collisions.
+    pub fn kept(
+        &self,
+        mut motion: Fourier,
+        figure: impl Fn(&Fourier) -> Option<f64>,
+    ) -> Option<(f64, Trajectory)> {
+        for _ in 0..T.motions.often[1] {
+            if self.limits.sampled(&motion).unwrap_or(false) {
+                let figure = figure(&motion)?;
+                if self.limits.holds(&motion).unwrap_or(false) {
+                    return Some((figure, self.trajectory(motion)));
+                }
+            }
+            shrink(&mut motion);
+        }
+        None
     }
 
     fn inside(&self, mut motion: Fourier, often: usize) -> Option<Fourier> {
@@ -140,10 +154,7 @@ impl<'a> Motions<'a> {
             if self.limits.holds(&motion).unwrap_or(false) {
                 return Some(motion);
             }
-            for s in &mut motion.joints {
-                let each = s.sin.iter_mut().chain(&mut s.cos);
-                each.for_each(|v| *v *= T.motions.shrink);
-            }
+            shrink(&mut motion);
         }
         None
     }
@@ -162,5 +173,13 @@ impl<'a> Motions<'a> {
     pub fn units(&self) -> Vec<&'static str> {
         let unit = |motion| unit_of(Kind::Position, motion);
         self.moved.joints.iter().map(|j| unit(j.motion)).collect()
+    }
+}
+
+/// Makes a motion smaller about its middle.
+fn shrink(motion: &mut Fourier) {
+    for s in &mut motion.joints {
+        let each = s.sin.iter_mut().chain(&mut s.cos);
+        each.for_each(|v| *v *= T.motions.shrink);
     }
 }

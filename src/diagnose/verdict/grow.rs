@@ -148,7 +148,8 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let predicted = predicts(data, &r0, &r1);
     let generalises = held == 0
         || hold > T.entry.holdout * visible * held as f64 / rows
-        || predicted > T.confidence.predicts.centre;
+        || predicted > T.confidence.predicts.centre
+        || st.remembers(&set[i]) && hold.abs() < T.entry.unseen * visible * held as f64 / rows;
     if significant && generalises {
         let after = st.gap(&r1, true);
         let worth = st.matters(&set[i], set.len(), [&gap, &after], prior);

@@ -81,7 +81,10 @@ pub fn judge(
     let known = known_by_itself(&m, &eta, &std);
     let steady = unsteady.map_or(1.0, |u| T.confidence.unsteady.below(u))
         * uneven.map_or(1.0, |u| T.confidence.uneven.below(u));
-    let together = known * steady * together(&m, &rivals, decoys);
+    // where holdout records do not show it, fitted ones must agree on it
+    let agreed = m.unseen().then(|| alike.unsteady(evidence)).flatten();
+    let holds = holds(&m).max(agreed.map_or(0.0, |u| T.confidence.unsteady.below(u)));
+    let together = known * steady * holds * together(&m, &rivals, decoys);
     Member {
         candidate: Candidate { eta, ..c.clone() },
         confidence: together / (1.0 + against(st, c.effect, &rivals)),
@@ -98,7 +101,7 @@ pub fn judge(
     }
 }
 
-/// The product of all conditions but those on how steady it is, 0 to 1: that the member is there, or one of its rivals.
+/// The product of all conditions but those on how steady it is and on holdout records, 0 to 1: that the member is there, or one of its rivals.
 fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>) -> f64 {
     let data = m.st.evidence.data;
     let [r0, r1] = &m.residual;
@@ -115,7 +118,6 @@ fn together(m: &Beside, rivals: &[Rival], decoys: Option<f64>) -> f64 {
         * explains_enough(m, rivals)
         * beside_larger(m)
         * ahead_of_friction(m)
-        * holds(m)
 }
 
 /// Whether a member takes away enough of the gap on its joints.
