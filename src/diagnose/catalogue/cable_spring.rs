@@ -16,6 +16,8 @@ const CUBIC: u8 = 1;
 const RUBS: u8 = 2;
 /// These displacements, over the range of the motion.
 const REACH: [f64; 2] = [0.01, 0.15];
+/// Its friction over the pull of the spring at the end of the range: less is a spring alone, more is friction.
+const RUB: [f64; 2] = [0.05, 1.0];
 
 impl Effect for CableSpring {
     fn card(&self) -> Card {
@@ -101,8 +103,10 @@ impl Effect for CableSpring {
         match shape.form {
             LINEAR => varies > 0.15 * eta[0].abs(),
             CUBIC => true,
-            // it is the spring that rubs
-            _ => eta[4] > 0.0 && eta[1] + eta[3] > eta[4],
+            _ => {
+                let pull = eta[1] + eta[3];
+                pull > 0.0 && (RUB[0] * pull..RUB[1] * pull).contains(&eta[4])
+            }
         }
     }
 

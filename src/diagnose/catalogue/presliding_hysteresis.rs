@@ -4,7 +4,8 @@ use super::bristles::Bristles;
 use super::*;
 use crate::diagnose::window::sign;
 
-/// Displacement over which friction builds up that is looked at, over the range of the motion.
+/// Displacements over which friction builds up that are looked at, over the range of the motion.
+pub(super) const SHORTEST: f64 = 3e-5;
 const WIDEST: f64 = 0.15;
 
 /// Pre-sliding hysteresis.
@@ -27,7 +28,7 @@ impl Effect for PreslidingHysteresis {
 
     fn shapes(&self, cx: &Context, place: &Place) -> Vec<Shape> {
         let [a, b] = cx.data.range[place.first()];
-        let grid = ladder(6e-4 * (b - a), WIDEST * (b - a), 9);
+        let grid = ladder(SHORTEST * (b - a), WIDEST * (b - a), 13);
         let with = |form: u8| grid.iter().map(move |s| Shape::new(form, &[*s]));
         (0..3).flat_map(with).collect()
     }

@@ -1,13 +1,14 @@
 //! Friction that rises towards standstill.
 
 use super::bristles::Bristles;
+use super::presliding_hysteresis::SHORTEST;
 use super::*;
 use crate::diagnose::window::sign;
 
 /// Form of a shape where friction also builds up over the displacement since the last reversal (LuGre).
 const BRISTLES: u8 = 1;
 /// Displacements over which it does so, lowest and highest, over the range of the motion.
-const REACH: [f64; 2] = [3e-5, 1e-3];
+const REACH: [f64; 2] = [SHORTEST, 1e-3];
 /// Share of Coulomb friction that the rise has at least there: less of it is pre-sliding hysteresis.
 const RISE: f64 = 0.1;
 

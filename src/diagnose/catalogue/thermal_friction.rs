@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// What one term may change against the other, over that.
+const AGAINST: f64 = 0.3;
+
 /// Thermal friction.
 pub struct ThermalFriction;
 
@@ -94,6 +97,13 @@ impl Effect for ThermalFriction {
             Column::on(j, times(cx.sign(j))),
             Column::on(j, times(cx.data.each(|r, _| r.state(j).1.to_vec()))),
         ]
+    }
+
+    // oil and grease change all friction in one direction; a curve over the velocity that turns is something else
+    fn plausible(&self, cx: &Context, place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
+        let [dry, viscous] = [eta[0], eta[1] * cx.data.speed[place.first()]];
+        let least = dry.abs().min(viscous.abs());
+        dry * viscous > 0.0 || least < AGAINST * dry.abs().max(viscous.abs())
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
