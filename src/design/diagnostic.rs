@@ -151,19 +151,24 @@ impl Checker {
     /// # Errors
     /// A motion of another robot.
     pub(crate) fn holds(&self, fourier: &Fourier) -> Result<bool> {
-        if !self.sampled(fourier)? {
-            return Ok(false);
-        }
-        match self.plant.certify_limits(fourier, self.derate) {
-            // collisions take longer to look at
-            Ok(found) if found.satisfied() => {
-                let clearance = self.plant.clearance(fourier)?;
-                Ok(clearance.is_none_or(|c| c.satisfied))
-            }
-            Ok(_) => Ok(false),
+        Ok(self.sampled(fourier)? && self.proven(fourier)?)
+    }
+
+    /// The same without a look at samples, which comes first.
+    ///
+    /// # Errors
+    /// A motion of another robot.
+    pub(crate) fn proven(&self, fourier: &Fourier) -> Result<bool> {
+        let limits = self.plant.certify_limits(fourier, self.derate);
+        // collisions take longer to look at
+        let all = limits.and_then(|found| {
+            let clear = || self.plant.clearance(fourier);
+            Ok(found.satisfied() && clear()?.is_none_or(|c| c.satisfied))
+        });
+        match all {
             // out of reach
             Err(Error::Infeasible(_)) => Ok(false),
-            Err(e) => Err(e),
+            all => all,
         }
     }
 

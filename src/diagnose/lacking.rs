@@ -18,7 +18,7 @@ use super::chain;
 use super::channel::Assumed;
 use super::data::Data;
 use super::evidence::{Evidence, Projected};
-use super::finding::{Finding, estimate};
+use super::finding::{self, Finding, estimate};
 use super::improve::Improved;
 use super::payload::Loads;
 use super::thresholds::THRESHOLDS as T;
@@ -497,6 +497,7 @@ impl Lacked {
         }
         let claimed = self.findings.iter().any(Finding::is_claim);
         findings.extend(self.findings.iter().cloned());
+        finding::order(findings);
         match verdict {
             Verdict::NoGap if claimed => Verdict::Explained,
             Verdict::Unknown if claimed => Verdict::PartlyExplained,

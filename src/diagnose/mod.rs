@@ -313,7 +313,6 @@ fn of_plant<'a>(
         }
         None => verdict,
     };
-    finding::order(&mut findings);
     warnings.extend(file.map(|(file, lacking)| lacking.warning(file)));
     let (holdout, unexplained) = match &lacked {
         Some(l) => (l.holdout, l.unexplained),

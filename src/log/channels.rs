@@ -227,7 +227,8 @@ pub fn position_unit(joint: &Joint, [low, high]: [f64; 2]) -> Option<Warning> {
     bounded
         .then(|| {
             text(&format!(
-                "beyond its limits of {:.3} to {:.3}: another unit, another zero, another joint, or a limit that is narrower than the robot's?",
+                "beyond its limits of {:.3} to {:.3}: another unit, another zero, another joint, or a limit that is \
+                 narrower than the robot's?",
                 limits[0], limits[1]
             ))
         })

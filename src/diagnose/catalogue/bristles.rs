@@ -1,23 +1,25 @@
 //! Friction that builds up over the displacement since the last reversal.
 
-use super::{Context, py};
-use crate::diagnose::window::{fine_values, sampled};
+use super::{Column, Context, py};
+use crate::diagnose::window::{fine_values, sampled, sign};
 
 /// Springs of the form with many strengths.
 const ELEMENTS: usize = 8;
+/// The form that builds up exponentially.
+pub(super) const DAHL: u8 = 0;
 
 /// Normalised friction force of bristles, between −1 and 1.
 pub(super) struct Bristles {
     /// displacement over which it builds up
     reach: f64,
-    /// 0 exponential (Dahl), 1 one spring that slips, 2 springs of many strengths
+    /// [`DAHL`], 1 one spring that slips, 2 springs of many strengths
     form: u8,
     at: f64,
     z: [f64; ELEMENTS],
 }
 
 impl Bristles {
-    pub fn new(reach: f64, form: u8, at: f64) -> Self {
+    fn new(reach: f64, form: u8, at: f64) -> Self {
         Bristles {
             reach,
             form,
@@ -47,6 +49,13 @@ impl Bristles {
         })
     }
 
+    /// Their force less that of friction that turns at once.
+    pub fn late(cx: &Context, j: usize, form: u8, reach: f64) -> Column {
+        let width = 1e-3 * cx.data.speed[j];
+        let values = Bristles::column(cx, j, form, reach, |z, v| z - sign(v, width));
+        Column::on(j, values)
+    }
+
     /// Lines of a function with a memory up to their force `z`, and what the memory starts with.
     pub fn lines(form: u8, reach: f64) -> (String, Vec<String>) {
         let (start, mut lines) = match form {
@@ -64,7 +73,7 @@ impl Bristles {
             form => {
                 let reach = py(reach);
                 let z = match form {
-                    0 => format!(
+                    DAHL => format!(
                         "xp.sign(d) + (memory[1] - xp.sign(d)) * xp.exp(-xp.abs(d) / {reach})"
                     ),
                     _ => format!("xp.clip(memory[1] + d / {reach}, -1.0, 1.0)"),
@@ -81,7 +90,7 @@ impl Bristles {
         let d = q - self.at;
         self.at = q;
         match self.form {
-            0 => {
+            DAHL => {
                 let s = d.signum();
                 if d != 0.0 {
                     // dz/dq = (1 − z sgn)/s, exactly over the step

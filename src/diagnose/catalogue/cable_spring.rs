@@ -1,6 +1,6 @@
 //! A cable or hose pulls on one joint: a static torque over its position.
 
-use super::bristles::Bristles;
+use super::bristles::{Bristles, DAHL};
 use super::*;
 use crate::export::element::cubic;
 use crate::report::format::significant;
@@ -75,26 +75,27 @@ impl Effect for CableSpring {
         }
         let pull = cubic(coefficients);
         let rubs = py(e.eta[4]);
-        let (start, mut lines) = Bristles::lines(0, e.shape[0]);
+        let (start, mut lines) = Bristles::lines(DAHL, e.shape[0]);
         lines.push(format!("return 0.0 * q, {pull} + {rubs} * z, memory"));
         let width = 1e-3 * cx.data.speed[joint];
         Some(Element::memory(joint, width, &start, 0.0, lines))
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
+        with_friction(cx, place.first(), shape, pull(cx, place.first(), shape))
+    }
+
+    fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let j = place.first();
-        let [a, b] = cx.data.range[j];
-        let (middle, half) = (0.5 * (a + b), (0.5 * (b - a)).max(1e-9));
-        let order = if shape.form == LINEAR { 1 } else { 3 };
-        let power = |p| Column::on(j, cx.data.own(j, |q, _| ((q - middle) / half).powi(p)));
-        let mut all: Vec<Column> = (0..=order).map(power).collect();
-        if shape.form == RUBS {
-            all.push(Column::on(
-                j,
-                Bristles::column(cx, j, 0, shape[0], |z, _| z),
-            ));
-        }
-        all
+        // the pull is the same however far its friction reaches
+        let mut last: Option<(u8, Vec<Column>)> = None;
+        let of = |shape: &Shape| {
+            let most = order(shape);
+            let known = last.take().filter(|l| l.0 == most);
+            let (_, smooth) = last.insert(known.unwrap_or_else(|| (most, pull(cx, j, shape))));
+            with_friction(cx, j, shape, smooth.clone())
+        };
+        shapes.iter().map(of).collect()
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, shape: &Shape, eta: &[f64]) -> bool {
@@ -163,4 +164,28 @@ impl Effect for CableSpring {
         }
         all
     }
+}
+
+/// Highest power of the pull.
+fn order(shape: &Shape) -> u8 {
+    if shape.form == LINEAR { 1 } else { 3 }
+}
+
+/// Powers of the position, from −1 to 1 over the range.
+fn pull(cx: &Context, j: usize, shape: &Shape) -> Vec<Column> {
+    let [a, b] = cx.data.range[j];
+    let (middle, half) = (0.5 * (a + b), (0.5 * (b - a)).max(1e-9));
+    let power = |p: u8| cx.data.own(j, |q, _| ((q - middle) / half).powi(p.into()));
+    (0..=order(shape))
+        .map(|p| Column::on(j, power(p)))
+        .collect()
+}
+
+/// The pull and, where it rubs, its friction.
+fn with_friction(cx: &Context, j: usize, shape: &Shape, mut pull: Vec<Column>) -> Vec<Column> {
+    if shape.form == RUBS {
+        let rubs = Bristles::column(cx, j, DAHL, shape[0], |z, _| z);
+        pull.push(Column::on(j, rubs));
+    }
+    pull
 }

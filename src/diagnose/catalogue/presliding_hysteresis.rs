@@ -2,7 +2,6 @@
 
 use super::bristles::Bristles;
 use super::*;
-use crate::diagnose::window::sign;
 
 /// Displacements over which friction builds up that are looked at, over the range of the motion.
 pub(super) const SHORTEST: f64 = 3e-5;
@@ -56,10 +55,8 @@ impl Effect for PreslidingHysteresis {
     }
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
-        let j = place.first();
-        let width = 1e-3 * cx.data.speed[j];
-        let late = Bristles::column(cx, j, shape.form, shape[0], |z, v| z - sign(v, width));
-        vec![Column::on(j, late)]
+        let late = Bristles::late(cx, place.first(), shape.form, shape[0]);
+        vec![late]
     }
 
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {

@@ -1,6 +1,6 @@
 //! Friction that rises towards standstill.
 
-use super::bristles::Bristles;
+use super::bristles::{Bristles, DAHL};
 use super::presliding_hysteresis::SHORTEST;
 use super::*;
 use crate::diagnose::window::sign;
@@ -79,7 +79,7 @@ impl Effect for StribeckFriction {
             return Some(Element::dry(j, width, level));
         }
         let coulomb = py(e.eta[1]);
-        let (start, mut lines) = Bristles::lines(0, e.shape[2]);
+        let (start, mut lines) = Bristles::lines(DAHL, e.shape[2]);
         lines.push(format!(
             "return -{coulomb}, ({coulomb} + {level}) * z, memory"
         ));
@@ -88,17 +88,29 @@ impl Effect for StribeckFriction {
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
-        let width = 1e-3 * cx.data.speed[j];
-        // one or two: a general power takes several times as long
-        let power = shape[1] as i32;
-        let fall = |v: f64| (-(v.abs() / shape[0]).powi(power)).exp();
-        if shape.form != BRISTLES {
-            let rise = cx.data.added(j, |_, v| sign(v, width) * fall(v));
-            return vec![Column::on(j, rise)];
+        let mut all = vec![rise(cx, j, shape)];
+        if shape.form == BRISTLES {
+            all.push(Bristles::late(cx, j, DAHL, shape[2]));
         }
-        let rise = Bristles::column(cx, j, 0, shape[2], |z, v| z * fall(v));
-        let late = Bristles::column(cx, j, 0, shape[2], |z, v| z - sign(v, width));
-        vec![Column::on(j, rise), Column::on(j, late)]
+        all
+    }
+
+    fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
+        let j = place.first();
+        // by how much bristles make Coulomb friction late is the same for every Stribeck velocity
+        let mut last: Option<(f64, Column)> = None;
+        let of = |shape: &Shape| {
+            let mut all = vec![rise(cx, j, shape)];
+            if shape.form == BRISTLES {
+                let reach = shape[2];
+                let known = last.take().filter(|l| l.0 == reach);
+                let (_, late) = last
+                    .insert(known.unwrap_or_else(|| (reach, Bristles::late(cx, j, DAHL, reach))));
+                all.push(late.clone());
+            }
+            all
+        };
+        shapes.iter().map(of).collect()
     }
 
     // a fit about reversals can ask for many times what slides
@@ -138,4 +150,19 @@ impl Effect for StribeckFriction {
         }
         all
     }
+}
+
+/// What the rise adds per unit of it.
+fn rise(cx: &Context, j: usize, shape: &Shape) -> Column {
+    // one or two: a general power takes several times as long
+    let power = shape[1] as i32;
+    let fall = |v: f64| (-(v.abs() / shape[0]).powi(power)).exp();
+    let values = match shape.form {
+        BRISTLES => Bristles::column(cx, j, DAHL, shape[2], |z, v| z * fall(v)),
+        _ => {
+            let width = 1e-3 * cx.data.speed[j];
+            cx.data.added(j, |_, v| sign(v, width) * fall(v))
+        }
+    };
+    Column::on(j, values)
 }

@@ -2,13 +2,13 @@
 
 use super::*;
 
-/// What one term may change against the other, over that.
+/// Most that one term may change against the other, over the change of that.
 const AGAINST: f64 = 0.3;
 
 /// Thermal friction.
 pub struct ThermalFriction;
 
-/// Shares of the warmth that are left when the next record begins: all, of pauses, or none.
+/// Shares of the warmth that are left when the next record begins.
 const KEPT: [f64; 4] = [1.0, 0.65, 0.35, 0.0];
 
 impl Effect for ThermalFriction {

@@ -56,8 +56,8 @@ impl<'a> Motions<'a> {
         let inside = all
             .into_par_iter()
             .with_max_len(1)
-            .filter_map(|(motion, often)| self.inside(motion, often));
-        inside.map(|f| self.trajectory(f)).collect()
+            .filter_map(|(motion, often)| self.inside(motion, often, |_| Some(())));
+        inside.map(|(_, f)| self.trajectory(f)).collect()
     }
 
     /// The program's own designs on two grids, each also slower.
@@ -130,31 +130,35 @@ impl<'a> Motions<'a> {
         motion
     }
 
-    /// A changed motion shrunk about its middle until all limits hold, with its `figure`; `None` where that fails, or no figure
-    /// is there when the limits of the actuators hold at samples. Those take less time to look at than the proof and collisions.
+    /// A changed motion [inside](Self::inside) all limits, with its figure.
     pub fn kept(
         &self,
-        mut motion: Fourier,
+        motion: Fourier,
         figure: impl Fn(&Fourier) -> Option<f64>,
     ) -> Option<(f64, Trajectory)> {
-        for _ in 0..T.motions.often[1] {
-            if self.limits.sampled(&motion).unwrap_or(false) {
-                let figure = figure(&motion)?;
-                if self.limits.holds(&motion).unwrap_or(false) {
-                    return Some((figure, self.trajectory(motion)));
-                }
-            }
-            shrink(&mut motion);
-        }
-        None
+        let (figure, motion) = self.inside(motion, T.motions.often[1], figure)?;
+        Some((figure, self.trajectory(motion)))
     }
 
-    fn inside(&self, mut motion: Fourier, often: usize) -> Option<Fourier> {
+    /// A motion shrunk about its middle until all limits hold, with its `figure`; `None` where that fails, or no figure is there when
+    /// the limits of the actuators hold at samples. The proof, and collisions, take longer to look at.
+    fn inside<F>(
+        &self,
+        mut motion: Fourier,
+        often: usize,
+        figure: impl Fn(&Fourier) -> Option<F>,
+    ) -> Option<(F, Fourier)> {
         for _ in 0..often {
-            if self.limits.holds(&motion).unwrap_or(false) {
-                return Some(motion);
+            if self.limits.sampled(&motion).unwrap_or(false) {
+                let figure = figure(&motion)?;
+                if self.limits.proven(&motion).unwrap_or(false) {
+                    return Some((figure, motion));
+                }
             }
-            shrink(&mut motion);
+            for s in &mut motion.joints {
+                let each = s.sin.iter_mut().chain(&mut s.cos);
+                each.for_each(|v| *v *= T.motions.shrink);
+            }
         }
         None
     }
@@ -173,13 +177,5 @@ impl<'a> Motions<'a> {
     pub fn units(&self) -> Vec<&'static str> {
         let unit = |motion| unit_of(Kind::Position, motion);
         self.moved.joints.iter().map(|j| unit(j.motion)).collect()
-    }
-}
-
-/// Makes a motion smaller about its middle.
-fn shrink(motion: &mut Fourier) {
-    for s in &mut motion.joints {
-        let each = s.sin.iter_mut().chain(&mut s.cos);
-        each.for_each(|v| *v *= T.motions.shrink);
     }
 }

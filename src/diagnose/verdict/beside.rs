@@ -197,11 +197,10 @@ impl<'a> Beside<'a> {
         scale * (kept(w) - kept(a)) / count[1] / there.max(1e-9)
     }
 
-    /// Whether an effect that depends on what was before a record is there on fitted records alone, as that of a joint which is warm
-    /// in the others.
+    /// Whether holdout records do not [show it](State::unseen).
     pub fn unseen(&self) -> bool {
         let held = self.held() > 0 && !self.frozen;
-        held && self.st.remembers(self.member) && self.repeats().abs() < T.entry.unseen
+        held && self.st.unseen(self.member, [self.repeats(), 1.0])
     }
 
     /// What it leaves on its joints, as the tests count it. Unit: noise variances.

@@ -149,7 +149,7 @@ fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let generalises = held == 0
         || hold > T.entry.holdout * visible * held as f64 / rows
         || predicted > T.confidence.predicts.centre
-        || st.remembers(&set[i]) && hold.abs() < T.entry.unseen * visible * held as f64 / rows;
+        || st.unseen(&set[i], [hold / held as f64, visible / rows]);
     if significant && generalises {
         let after = st.gap(&r1, true);
         let worth = st.matters(&set[i], set.len(), [&gap, &after], prior);

@@ -165,6 +165,12 @@ impl State<'_> {
         self.effects[c.effect].remembers()
     }
 
+    /// Whether holdout records do not show an effect that depends on what was before a record, as that of a joint which is warm in
+    /// them: from its gain per row on holdout records and on fitted ones.
+    pub fn unseen(&self, c: &Candidate, [held, fitted]: [f64; 2]) -> bool {
+        self.remembers(c) && held.abs() < T.entry.unseen * fitted
+    }
+
     /// Whether an effect explains enough to be a finding, 0 to 1, from the gap by actuator without it
     /// and with it. An effect that explains almost nothing is not a finding, nor is one in a gap no larger
     /// than a sound model leaves, unless the `fall` of the prior's penalty [tells of it](Self::told_by_parameters). `members` are in the set.
