@@ -170,7 +170,10 @@ impl Finder<'_> {
     fn settled(&self, task: Task, (mut last, mut shape): (Tried, Shape)) -> (Tried, Shape) {
         let effect = self.effect(task);
         for step in T.settle.steps {
-            for k in (0..shape.constants.len()).filter(|k| effect.refinable(*k)) {
+            for k in 0..shape.constants.len() {
+                if !effect.refinable(&shape, k) {
+                    continue;
+                }
                 for factor in [step, 1.0 / step] {
                     let from = shape.clone();
                     for _ in 0..T.settle.most {
@@ -245,7 +248,7 @@ impl Finder<'_> {
             });
             (k, a / T.shapes.below..=b * T.shapes.above)
         };
-        let constants = (0..s.shape.constants.len()).filter(|k| effect.refinable(*k));
+        let constants = (0..s.shape.constants.len()).filter(|k| effect.refinable(&s.shape, *k));
         let bounds: Vec<_> = constants.map(of).collect();
         for step in T.shapes.steps {
             // not back to where it came from

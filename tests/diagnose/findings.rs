@@ -327,6 +327,67 @@ fn a_joint_that_is_warm_when_the_holdout_record_begins() {
     assert_eq!(claims(&d), [("thermal_friction", vec![1])]);
 }
 
+/// A refit takes all of it, and leaves nothing but a parameter that an identified model does not have.
+#[test]
+fn a_term_that_changed_since_it_was_identified() {
+    let mut model = robots().0.robot().clone();
+    model.prior = Prior::Identified;
+    let changes = [
+        ("viscous_friction", JointTerm::Viscous, 1.0),
+        ("coulomb_friction", JointTerm::Coulomb, 0.8),
+        ("torque_offset", JointTerm::Offset, 0.7),
+    ];
+    let named = |term: Option<(JointTerm, f64)>| {
+        let mut machine = model.clone();
+        if let Some((term, by)) = term {
+            machine.joints[1].terms[term as usize] += by;
+        }
+        let logs = logs_of([&machine; 4], &mut |_, _, _, _, _| 0.0);
+        let settings = Settings::default().with(|set| set.next = false);
+        of_logs(&Plant::from(model.clone()), &logs, &settings, &|_| {}).expect("a diagnosis")
+    };
+    let sound = named(None);
+    assert_eq!(sound.verdict, Verdict::NoGap, "{:?}", claims(&sound));
+    for (effect, term, by) in changes {
+        let d = named(Some((term, by)));
+        assert_eq!(claims(&d), [(effect, vec![1])], "{effect}");
+        assert_eq!(d.verdict, Verdict::Explained, "{effect}");
+        let whole = model.joints[1].terms[term as usize] + by;
+        let told = d.findings[0].values[0].value;
+        assert!((told - whole).abs() < 0.1, "{effect}: {told} for {whole}");
+    }
+}
+
+/// What it reports grows far beyond what it makes. The torque that is missing is no torque that a drive would have to make.
+#[test]
+fn a_drive_at_its_limit() {
+    let mut most = 0.0f64;
+    logs(&mut |j, _, _, _, tau| {
+        most = most.max(if j == 1 { tau.abs() } else { 0.0 });
+        0.0
+    });
+    let limit = 1.0005 * most;
+    let d = run(&mut |j, _, _, _, tau| match j {
+        1 => limit * (tau / limit).atanh() - tau,
+        _ => 0.0,
+    });
+    assert_eq!(claims(&d), [("torque_saturation", vec![1])]);
+    let f = &d.findings[0];
+    assert!(f.explains > 0.95, "explains {}", f.explains);
+    let told = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);
+    let close = |v: f64| (v / limit - 1.0).abs() < 0.2;
+    assert!(
+        told("limit").is_some_and(close),
+        "{:?} for {limit}",
+        f.values
+    );
+    assert!(
+        told("peak").is_some_and(|p| p > 3.0 * limit),
+        "{:?}",
+        f.values
+    );
+}
+
 #[test]
 fn a_force_from_outside_has_no_name() {
     let d = run(&mut |j, t, q, _, _| {

@@ -47,7 +47,7 @@ impl Effect for Backlash {
         all
     }
 
-    fn refinable(&self, _k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, _k: usize) -> bool {
         true
     }
 

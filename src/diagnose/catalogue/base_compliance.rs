@@ -38,7 +38,7 @@ impl Effect for BaseCompliance {
         all
     }
 
-    fn refinable(&self, _k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, _k: usize) -> bool {
         true
     }
 

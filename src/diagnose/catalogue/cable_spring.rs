@@ -50,7 +50,7 @@ impl Effect for CableSpring {
         3
     }
 
-    fn refinable(&self, _k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, _k: usize) -> bool {
         true
     }
 

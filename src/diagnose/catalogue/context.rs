@@ -131,22 +131,6 @@ impl<'a> Context<'a> {
         self.stated(place, term) + eta[0]
     }
 
-    /// Actuators whose nominal model has no unknown of this kind.
-    pub fn without(&self, term: JointTerm) -> Vec<Place> {
-        let actuated = self.data.plant.actuated();
-        self.singles()
-            .into_iter()
-            .filter(|place| {
-                let joint = actuated[place.first()];
-                !self
-                    .data
-                    .parameters
-                    .iter()
-                    .any(|p| p.kind == plant::Column::Term { joint, term })
-            })
-            .collect()
-    }
-
     /// Terms of an actuator's own joint, in the order of [`JointTerm::ALL`]: as fitted, else as the robot file has them;
     /// `None` where those of one drive act on others.
     pub fn terms(&self, j: usize) -> Option<[f64; 4]> {

@@ -21,7 +21,7 @@ impl Effect for CoulombFriction {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.without(JointTerm::Coulomb)
+        cx.singles()
     }
 
     fn familiarity(&self) -> f64 {

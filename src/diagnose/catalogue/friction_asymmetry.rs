@@ -51,6 +51,10 @@ impl Effect for FrictionAsymmetry {
         Some(Element::smooth(j, 1e-3 * cx.data.speed[j], torque))
     }
 
+    fn at_reversals(&self, shape: &Shape) -> bool {
+        shape.form == 1
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let mut all = vec![Column::on(j, cx.data.own(j, |_, v| v.abs()))];

@@ -38,7 +38,7 @@ impl Effect for JointElasticity {
         all
     }
 
-    fn refinable(&self, k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, k: usize) -> bool {
         k < 2
     }
 

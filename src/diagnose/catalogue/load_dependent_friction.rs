@@ -64,6 +64,10 @@ impl Effect for LoadDependentFriction {
         Some(Element::dry(j, sharp, level))
     }
 
+    fn at_reversals(&self, _shape: &Shape) -> bool {
+        true
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let (load, largest) = Self::load(cx, j, shape.form);

@@ -131,7 +131,7 @@ pub trait Effect: Sync {
         0.0
     }
     /// Whether shape constant `k` is a positive number that may be refined between grid points.
-    fn refinable(&self, _k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, _k: usize) -> bool {
         false
     }
     /// Whether one of the whole robot is the same on every actuator, where each could have its own.
@@ -172,6 +172,10 @@ pub trait Effect: Sync {
     /// Whether it may be believed where it explains a part of the gap on its joints only, and nothing else comes near that part.
     fn of_a_part(&self, _shape: &Shape) -> bool {
         true
+    }
+    /// Whether its columns are made from the torque that it explains: whatever else raises that explains itself in part.
+    fn explains_itself(&self, _shape: &Shape) -> bool {
+        false
     }
     /// Whether its friction changes most about the reversals of its joint: what the formula of a large one misses there looks like
     /// another one.

@@ -40,6 +40,10 @@ impl Effect for PositionDependentFriction {
         Some(Element::dry(j, 1e-3 * cx.data.speed[j], level))
     }
 
+    fn at_reversals(&self, _shape: &Shape) -> bool {
+        true
+    }
+
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         let width = 1e-3 * cx.data.speed[j];

@@ -32,7 +32,7 @@ impl Effect for PreslidingHysteresis {
         (0..3).flat_map(with).collect()
     }
 
-    fn refinable(&self, k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, k: usize) -> bool {
         k == 0
     }
 

@@ -21,7 +21,7 @@ impl Effect for RotorInertia {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.without(JointTerm::Armature)
+        cx.singles()
     }
 
     fn familiarity(&self) -> f64 {

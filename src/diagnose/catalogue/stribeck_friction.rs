@@ -53,7 +53,7 @@ impl Effect for StribeckFriction {
         all
     }
 
-    fn refinable(&self, k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, k: usize) -> bool {
         k != 1
     }
 

@@ -37,7 +37,7 @@ impl Effect for ThermalFriction {
         all
     }
 
-    fn refinable(&self, k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, k: usize) -> bool {
         k < 2
     }
 

@@ -34,7 +34,7 @@ impl Effect for TorqueDelay {
         all
     }
 
-    fn refinable(&self, _k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, _k: usize) -> bool {
         true
     }
 

@@ -21,7 +21,7 @@ impl Effect for TorqueOffset {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.without(JointTerm::Offset)
+        cx.singles()
     }
 
     fn familiarity(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! A motor that gives less torque per current at high torque, or a limited torque.
 
 use super::*;
+use crate::median::median;
 
 /// Saturation of the torque constant.
 pub struct TorqueSaturation;
@@ -9,13 +10,35 @@ pub struct TorqueSaturation;
 const EXPONENT: u8 = 0;
 /// Loss beyond this share of the peak.
 const LIMIT: u8 = 1;
+/// The torque tends to a limit, however much more is asked for: a share of the peak that is reported. What a drive makes tells little of
+/// what is asked for there, so the loss is one of what is reported.
+const TENDS: u8 = 2;
+
+/// Largest absolute value.
+fn peak(x: &[f64]) -> f64 {
+    x.iter().fold(1e-9, |m, v| m.max(v.abs()))
+}
+
+/// Most of it that a drive may lose at half of all times: one that is at its limit then moves no robot as it is told, and what is
+/// lost is the torque itself.
+const AT_MEDIAN: f64 = 0.1;
+
+/// Share of a torque that is lost where it tends to a limit, from their ratio.
+fn lost(ratio: f64, sharp: f64) -> f64 {
+    1.0 - (1.0 + ratio.powf(sharp)).powf(-1.0 / sharp)
+}
+
+/// Torques that the drive of a joint reports.
+fn reported(cx: &Context, j: usize) -> Vec<f64> {
+    cx.data.each(|r, _| smooth(r.torque(j)))
+}
 
 impl Effect for TorqueSaturation {
     fn card(&self) -> Card {
         Card {
             name: "torque_saturation",
             title: "saturation of the torque constant",
-            equation: "κ τ |τ|^{e−1}, or beyond a limit",
+            equation: "κ τ |τ|^{e−1}, or beyond a limit; u − u/(1 + |u/τ_s|^e)^{1/e} of what is reported",
             source: "motor handbooks; Krishnan 2010",
             aliases: &[],
             separated_by: "high torques at low speed",
@@ -31,21 +54,58 @@ impl Effect for TorqueSaturation {
         };
         let exponents = with(EXPONENT, &[2.0, 3.0, 5.0]);
         let limits = with(LIMIT, &[0.4, 0.55, 0.7, 0.85]);
-        [exponents, limits].concat()
+        let tends = ladder(0.012, 0.8, 13)
+            .into_iter()
+            .flat_map(|limit| [2.0, 4.0, 8.0].map(|sharp| Shape::new(TENDS, &[limit, sharp])));
+        exponents.into_iter().chain(limits).chain(tends).collect()
+    }
+
+    fn most(&self) -> f64 {
+        // it is what the drive does not make, however much is asked of it
+        f64::INFINITY
     }
 
     fn forms(&self) -> u8 {
-        2
+        3
     }
 
-    fn freedoms(&self, _shape: &Shape) -> usize {
-        // the exponent or the limit
-        1
+    fn freedoms(&self, shape: &Shape) -> usize {
+        // the exponent, the limit, or both
+        shape.constants.len()
+    }
+
+    fn refinable(&self, shape: &Shape, _k: usize) -> bool {
+        shape.form == TENDS
+    }
+
+    fn explains_itself(&self, shape: &Shape) -> bool {
+        shape.form == TENDS
     }
 
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let j = e.place.first();
-        let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));
+        if e.shape.form == TENDS {
+            let top = peak(&reported(cx, j));
+            let [limit, sharp] = [e.shape[0] * top, e.shape[1]];
+            // no more than twice what was seen
+            let far = 2.0 * top / limit;
+            let far = py(far / (1.0 + far.powf(sharp)).powf(1.0 / sharp));
+            let [limit, sharp, loss] = [limit, sharp, e.eta[0].min(1.0)].map(py);
+            let lines = vec![
+                format!("made = xp.abs(tau) / {limit}"),
+                format!("within = xp.clip(made, 0.0, {far})"),
+                format!(
+                    "u = within / (1.0 - within ** {sharp}) ** (1.0 / {sharp}) + made - within"
+                ),
+                "for _ in range(8):".to_string(),
+                format!("    left = (1.0 + u ** {sharp}) ** (-1.0 / {sharp})"),
+                format!("    over = u - {loss} * (u - u * left) - made"),
+                format!("    u = u - over / (1.0 - {loss} * (1.0 - left / (1.0 + u ** {sharp})))"),
+                format!("return xp.sign(tau) * {limit} * u"),
+            ];
+            return Some(Element::of(Kind::Drive, j, lines));
+        }
+        let peak = peak(&cx.model[j]);
         let [loss, peak, at] = [e.eta[0], peak, e.shape[0]].map(py);
         let part = match e.shape.form {
             EXPONENT => format!("(xp.abs(tau) / {peak}) ** {at}"),
@@ -59,7 +119,13 @@ impl Effect for TorqueSaturation {
 
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
-        let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));
+        if shape.form == TENDS {
+            let all = reported(cx, j);
+            let limit = shape[0] * peak(&all);
+            let loss = |u: &f64| u * lost((u / limit).abs(), shape[1]);
+            return vec![Column::on(j, all.iter().map(loss).collect())];
+        }
+        let peak = peak(&cx.model[j]);
         let values = cx.model[j]
             .iter()
             .map(|t| {
@@ -76,8 +142,16 @@ impl Effect for TorqueSaturation {
     }
 
     // a drive that gave more torque per current at high torque would be no saturated one
-    fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, eta: &[f64]) -> bool {
-        eta[0] > 0.0
+    fn plausible(&self, cx: &Context, place: &Place, shape: &Shape, eta: &[f64]) -> bool {
+        match shape.form {
+            // its formula has the size of the loss in it
+            TENDS => {
+                let all = reported(cx, place.first());
+                let ratio = median(all.iter().map(|u| u.abs())) / (shape[0] * peak(&all));
+                (0.6..1.5).contains(&eta[0]) && shape[1] > 1.0 && lost(ratio, shape[1]) < AT_MEDIAN
+            }
+            _ => eta[0] > 0.0,
+        }
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
@@ -88,14 +162,24 @@ impl Effect for TorqueSaturation {
             std,
         } = e;
         let j = place.first();
-        let peak = cx.model[j].iter().fold(1e-9f64, |m, v| m.max(v.abs()));
-        let mut all = vec![value("loss_at_peak", eta[0], std[0], "")];
-        if shape.form == EXPONENT {
-            all.push(constant("exponent", shape[0], ""));
-        } else {
-            all.push(constant("limit", shape[0] * peak, cx.torque_unit(j)));
+        let unit = cx.torque_unit(j);
+        if shape.form == TENDS {
+            let top = peak(&reported(cx, j));
+            let loss = lost(1.0 / shape[0], shape[1]);
+            return vec![
+                value("loss_at_peak", eta[0] * loss, std[0] * loss, ""),
+                constant("exponent", shape[1], ""),
+                constant("limit", shape[0] * top, unit),
+                constant("peak", top, unit),
+            ];
         }
-        all.push(constant("peak", peak, cx.torque_unit(j)));
+        let peak = peak(&cx.model[j]);
+        let mut all = vec![value("loss_at_peak", eta[0], std[0], "")];
+        all.push(match shape.form {
+            EXPONENT => constant("exponent", shape[0], ""),
+            _ => constant("limit", shape[0] * peak, unit),
+        });
+        all.push(constant("peak", peak, unit));
         all
     }
 }

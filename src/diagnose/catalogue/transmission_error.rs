@@ -56,7 +56,7 @@ impl Effect for TransmissionError {
         2
     }
 
-    fn refinable(&self, k: usize) -> bool {
+    fn refinable(&self, _shape: &Shape, k: usize) -> bool {
         k == 1
     }
 

@@ -21,7 +21,7 @@ impl Effect for ViscousFriction {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.without(JointTerm::Viscous)
+        cx.singles()
     }
 
     fn familiarity(&self) -> f64 {

@@ -138,13 +138,16 @@ fn explains_enough(m: &Beside, rivals: &[Rival]) -> f64 {
 }
 
 /// Whether a member is large enough beside a larger one of the same joint, where it may be what the formula of that one
-/// misses: friction about reversals beside other such friction, and torque ahead of the positions beside anything.
+/// misses: friction about reversals, or a late torque, beside such friction, and torque ahead of the positions beside anything.
 fn beside_larger(m: &Beside) -> f64 {
     let effects = m.st.effects;
     let reverses = |c: &Candidate| effects[c.effect].at_reversals(&c.shape);
-    let left = !effects[m.member.effect].of_a_part(&m.member.shape);
+    let effect = &effects[m.member.effect];
+    let left = !effect.of_a_part(&m.member.shape);
+    // dry friction that reverses late moves as a late torque does
+    let follows = reverses(m.member) || effect.late();
     let misses = |c: &Candidate| {
-        let alike = reverses(m.member) && reverses(c);
+        let alike = follows && reverses(c);
         !c.same(m.member) && c.place == m.member.place && (left || alike)
     };
     let gained = |i: usize| m.with.gain - m.st.gain(&others(m.set, i));

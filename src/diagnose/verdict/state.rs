@@ -200,7 +200,11 @@ impl State<'_> {
             true => T.matters.ringing.above(own),
             false => 1.0,
         };
-        let shown = T.matters.of_joints.above(seen)
+        let enough = match self.effects[c.effect].explains_itself(&c.shape) {
+            true => T.matters.itself.above(seen),
+            false => T.matters.of_joints.above(seen),
+        };
+        let shown = enough
             * T.matters.of_all.above(explains)
             * T.matters.gap.scaled(self.scale(members)).above(there)
             * ringing;

@@ -43,16 +43,25 @@ def command(told, xp=np):
 
     They have the gains and delays of the drives; what they have not is taken off here, N m or N.
     """
-    tau = told
+    drives = [(j, f) for j, f, native in DRIVES if not native]
+    if not drives:
+        return told
+
+    def reports(tau):
+        out = [tau[..., j] for j in range(len(JOINTS))]
+        for j, f in drives:
+            out[j] = out[j] + f(tau[..., j], xp) - tau[..., j]
+        return xp.stack(out, -1)
+
+    # they make no more than they report
+    most, least = xp.abs(told), -xp.abs(told)
     for _ in range(60):
-        less = [0.0 * tau[..., j] for j in range(len(JOINTS))]
-        for j, f, native in DRIVES:
-            if not native:
-                less[j] = less[j] + f(tau[..., j], xp) - tau[..., j]
-        before, tau = tau, 0.5 * tau + 0.5 * (told - xp.stack(less, -1))
-        if xp is np and np.array_equal(before, tau):
-            break
-    return tau
+        tau = 0.5 * (least + most)
+        over = reports(tau) > told
+        least, most = xp.where(over, least, tau), xp.where(over, tau, most)
+    # the last step has a derivative
+    tau, by = 0.5 * (least + most), 1e-4 + 1e-4 * xp.abs(told)
+    return tau + (told - reports(tau)) * 2.0 * by / (reports(tau + by) - reports(tau - by))
 
 
 def recalled(memory, data, q):
