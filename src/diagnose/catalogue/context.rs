@@ -1,6 +1,6 @@
 //! What columns of effects are computed from: the records, the nominal model as fitted, and its torques.
 
-use super::estimate::{Place, Quantity};
+use super::estimate::{Estimate, Place, Quantity, Value, constant, value};
 use super::leg_geometry::Deformations;
 use super::{Robots, base_compliance};
 use crate::diagnose::column::Column;
@@ -129,6 +129,20 @@ impl<'a> Context<'a> {
     /// The whole of a term of which an effect adds a part.
     pub fn whole(&self, place: &Place, term: JointTerm, eta: &[f64]) -> f64 {
         self.stated(place, term) + eta[0]
+    }
+
+    /// The whole of a term of which an effect adds a part, and what the nominal model has of it where that is not 0, under two names.
+    pub fn term_values(
+        &self,
+        [name, before]: [&'static str; 2],
+        term: JointTerm,
+        e: &Estimate,
+        unit: &'static str,
+    ) -> Vec<Value> {
+        let stated = self.stated(&e.place, term);
+        let whole = value(name, self.whole(&e.place, term, &e.eta), e.std[0], unit);
+        let nominal = (stated != 0.0).then(|| constant(before, stated, unit));
+        [Some(whole), nominal].into_iter().flatten().collect()
     }
 
     /// Terms of an actuator's own joint, in the order of [`JointTerm::ALL`]: as fitted, else as the robot file has them;

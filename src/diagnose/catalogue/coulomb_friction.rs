@@ -42,11 +42,7 @@ impl Effect for CoulombFriction {
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
-        let Estimate {
-            place, eta, std, ..
-        } = e;
-        let unit = cx.torque_unit(place.first());
-        let whole = cx.whole(place, JointTerm::Coulomb, eta);
-        vec![value("coulomb_friction", whole, std[0], unit)]
+        let unit = cx.torque_unit(e.place.first());
+        cx.term_values(["coulomb_friction", "nominal"], JointTerm::Coulomb, e, unit)
     }
 }

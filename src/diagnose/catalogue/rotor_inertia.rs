@@ -42,11 +42,7 @@ impl Effect for RotorInertia {
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
-        let Estimate {
-            place, eta, std, ..
-        } = e;
-        let unit = cx.unit(place.first(), Quantity::Inertia);
-        let whole = cx.whole(place, JointTerm::Armature, eta);
-        vec![value("rotor_inertia", whole, std[0], unit)]
+        let unit = cx.unit(e.place.first(), Quantity::Inertia);
+        cx.term_values(["rotor_inertia", "nominal"], JointTerm::Armature, e, unit)
     }
 }

@@ -38,11 +38,7 @@ impl Effect for TorqueOffset {
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
-        let Estimate {
-            place, eta, std, ..
-        } = e;
-        let unit = cx.torque_unit(place.first());
-        let whole = cx.whole(place, JointTerm::Offset, eta);
-        vec![value("torque_offset", whole, std[0], unit)]
+        let unit = cx.torque_unit(e.place.first());
+        cx.term_values(["torque_offset", "nominal"], JointTerm::Offset, e, unit)
     }
 }

@@ -42,11 +42,7 @@ impl Effect for ViscousFriction {
     }
 
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
-        let Estimate {
-            place, eta, std, ..
-        } = e;
-        let unit = cx.unit(place.first(), Quantity::Damping);
-        let whole = cx.whole(place, JointTerm::Viscous, eta);
-        vec![value("viscous_friction", whole, std[0], unit)]
+        let unit = cx.unit(e.place.first(), Quantity::Damping);
+        cx.term_values(["viscous_friction", "nominal"], JointTerm::Viscous, e, unit)
     }
 }
