@@ -9,7 +9,7 @@ use crate::diagnose::window::averaged;
 use crate::dynamics::Samples;
 use crate::mechanism::MechanismMotion;
 use crate::plant;
-use crate::robot::{JointTerm, Motion};
+use crate::robot::{JointTerm, Motion, Prior};
 use crate::signals::series::Series;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -129,6 +129,20 @@ impl<'a> Context<'a> {
     /// The whole of a term of which an effect adds a part.
     pub fn whole(&self, place: &Place, term: JointTerm, eta: &[f64]) -> f64 {
         self.stated(place, term) + eta[0]
+    }
+
+    /// Actuators whose term of this kind may be another than the nominal model has it: all of an identified model; of a rough one those
+    /// of which it has no unknown, because whatever value a refit gives the others is ordinary.
+    pub fn changed(&self, term: JointTerm) -> Vec<Place> {
+        let plant = self.data.plant;
+        let listed = |place: &Place| {
+            let joint = plant.actuated()[place.first()];
+            let kind = plant::Column::Term { joint, term };
+            self.data.parameters.iter().any(|p| p.kind == kind)
+        };
+        let mut all = self.singles();
+        all.retain(|place| plant.prior() == Prior::Identified || !listed(place));
+        all
     }
 
     /// The whole of a term of which an effect adds a part, and what the nominal model has of it where that is not 0, under two names.

@@ -21,7 +21,7 @@ impl Effect for CoulombFriction {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.singles()
+        cx.changed(JointTerm::Coulomb)
     }
 
     fn familiarity(&self) -> f64 {

@@ -21,7 +21,7 @@ impl Effect for RotorInertia {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.singles()
+        cx.changed(JointTerm::Armature)
     }
 
     fn familiarity(&self) -> f64 {

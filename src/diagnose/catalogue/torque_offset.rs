@@ -21,7 +21,7 @@ impl Effect for TorqueOffset {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.singles()
+        cx.changed(JointTerm::Offset)
     }
 
     fn familiarity(&self) -> f64 {

@@ -21,7 +21,7 @@ impl Effect for ViscousFriction {
     }
 
     fn places(&self, cx: &Context) -> Vec<Place> {
-        cx.singles()
+        cx.changed(JointTerm::Viscous)
     }
 
     fn familiarity(&self) -> f64 {
