@@ -9,12 +9,7 @@ no velocities in them. The robot file is off as one from CAD is, or close as an 
 often that was right. Needs numpy and mujoco.
 """
 
-import argparse
-import json
-import subprocess
-from multiprocessing import Pool
-from pathlib import Path
-
+import arms
 import mujoco
 import numpy as np
 
@@ -269,52 +264,26 @@ class Machine:
         wanted = self.effect.replace("delay_of_one_joint", "torque_delay")
         return effect in wanted and own in joints
 
+    def told(self):
+        return (
+            f"{self.kind} {self.n} joints, {self.bits} bits, {self.rate} Hz{', averaged' if self.average else ''}, "
+            f"{'identified' if self.close else 'cad'}: {self.effect} (joint{self.joint + 1})"
+        )
+
 
 def case(job):
     """What was named on one arm."""
-    number, options = job
-    machine, folder = Machine(options.seed, number, options.hobby), options.output / f"arm_{number:03d}"
-    machine.write(folder, options.file)
-    told = [options.excite, "diagnose", folder / "experiment.toml", "--no-next", "--force", "--output", folder / "gap"]
-    done = subprocess.run(told, capture_output=True, text=True, check=False)
-    if done.returncode:
-        return number, machine, "failed: " + done.stderr.strip(), []
-    found = json.loads((folder / "gap/diagnosis.json").read_text())
-    known = FRICTION if options.file != "full" else []
-    claims = [f for f in found["findings"] if f["confidence"] >= options.claim and f["effect"] not in known]
-    return number, machine, found["verdict"], [(f["effect"], f["joints"], f["confidence"]) for f in claims]
+    number, asked = job
+    machine, folder = Machine(asked.seed, number, asked.hobby), asked.output / f"arm_{number:03d}"
+    machine.write(folder, asked.file)
+    return arms.diagnosed(machine, folder, asked, FRICTION if asked.file != "full" else ())
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--excite", type=Path, default=Path("target/release/excite"))
-    parser.add_argument("--arms", type=int, default=34)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, nargs="+", help="numbers of the arms that are made, instead of all")
+    parser = arms.options(34, "target/mujoco_arms")
     parser.add_argument("--hobby", action="store_true", help="hobby arms alone: 12 bits, 500 Hz, torques at an instant")
     parser.add_argument("--file", choices=FILES, default="full", help="what files state of friction; the names of friction that others lack are passed over")
-    parser.add_argument("--claim", type=float, default=0.5, help="least confidence of a name that counts")
-    parser.add_argument("--output", type=Path, default=Path("target/mujoco_arms"))
-    options = parser.parse_args()
-    named = wrong = clean = quiet = hidden = 0
-    with Pool(2) as pool:
-        for number, m, verdict, claims in pool.imap(case, ((k, options) for k in options.only or range(options.arms))):
-            marks = [m.right(effect, joints) for effect, joints, _ in claims]
-            said = "; ".join(
-                f"{effect} {','.join(joints)} {confidence:.2f}{'' if mark else ' WRONG'}"
-                for (effect, joints, confidence), mark in zip(claims, marks)
-            )
-            print(
-                f"{number:3} {m.kind} {m.n} joints, {m.bits} bits, {m.rate} Hz{', averaged' if m.average else ''}, "
-                f"{'identified' if m.close else 'cad'}: {m.effect} (joint{m.joint + 1}): {verdict}; {said}",
-                flush=True,
-            )
-            sound = m.effect == "none"
-            clean, quiet = clean + sound, quiet + (sound and not claims)
-            if not sound and m.effect != "outside":
-                hidden, named = hidden + 1, named + any(marks)
-            wrong += len(marks) - sum(marks)
-    print(f"{quiet} of {clean} clean arms without a name; {named} of {hidden} hidden effects named; {wrong} wrong names")
+    arms.count(case, parser.parse_args(), {"outside"})
 
 
 if __name__ == "__main__":

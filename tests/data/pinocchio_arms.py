@@ -9,13 +9,10 @@ link of its own with a spring, a dead band or an uneven gear between them, and a
 often that was right. Needs numpy, pin and example-robot-data.
 """
 
-import argparse
-import json
 import re
-import subprocess
-from multiprocessing import Pool
 from pathlib import Path
 
+import arms
 import numpy as np
 import pinocchio as pin
 
@@ -302,49 +299,25 @@ class Machine:
         whole = effect in ("payload", "torque_delay", "gravity_direction", "base_compliance", "link_inertia")
         return effect in (self.effect, same.get(self.effect)) and (whole or self.names[self.joint] in joints)
 
+    def told(self):
+        return (
+            f"{self.robot}, {self.bits} bits, {self.rate} Hz, {'identified' if self.close else 'cad'}: "
+            f"{self.effect} ({self.names[self.joint]})"
+        )
+
 
 def case(job):
     """What was named on one arm."""
-    number, options = job
-    machine, folder = Machine(options.seed, number, options.robot), options.output / f"arm_{number:03d}"
+    number, asked = job
+    machine, folder = Machine(asked.seed, number, asked.robot), asked.output / f"arm_{number:03d}"
     machine.write(folder)
-    told = [options.excite, "diagnose", folder / "experiment.toml", "--no-next", "--force", "--output", folder / "gap"]
-    done = subprocess.run(told, capture_output=True, text=True, check=False)
-    if done.returncode:
-        return number, machine, "failed: " + done.stderr.strip(), []
-    found = json.loads((folder / "gap/diagnosis.json").read_text())
-    claims = [f for f in found["findings"] if f["confidence"] >= options.claim]
-    return number, machine, found["verdict"], [(f["effect"], f["joints"], f["confidence"]) for f in claims]
+    return arms.diagnosed(machine, folder, asked)
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--excite", type=Path, default=Path("target/release/excite"))
-    parser.add_argument("--arms", type=int, default=len(EFFECTS))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, nargs="+", help="numbers of the arms that are made, instead of all")
+    parser = arms.options(len(EFFECTS), "target/pinocchio_arms")
     parser.add_argument("--robot", choices=ROBOTS, help="one robot instead of each in turn")
-    parser.add_argument("--claim", type=float, default=0.5, help="least confidence of a name that counts")
-    parser.add_argument("--output", type=Path, default=Path("target/pinocchio_arms"))
-    options = parser.parse_args()
-    named = wrong = clean = quiet = hidden = 0
-    with Pool(2) as pool:
-        for number, m, verdict, claims in pool.imap(case, ((k, options) for k in options.only or range(options.arms))):
-            marks = [m.right(effect, joints) for effect, joints, _ in claims]
-            said = "; ".join(
-                f"{effect} {','.join(joints)} {confidence:.2f}{'' if mark else ' WRONG'}"
-                for (effect, joints, confidence), mark in zip(claims, marks)
-            )
-            print(
-                f"{number:3} {m.robot}, {m.bits} bits, {m.rate} Hz, {'identified' if m.close else 'cad'}: "
-                f"{m.effect} ({m.names[m.joint]}): {verdict}; {said}",
-                flush=True,
-            )
-            clean, quiet = clean + (m.effect == "none"), quiet + (m.effect == "none" and not claims)
-            if m.effect != "none" and m.effect not in OUTSIDE:
-                hidden, named = hidden + 1, named + any(marks)
-            wrong += len(marks) - sum(marks)
-    print(f"{quiet} of {clean} clean arms without a name; {named} of {hidden} hidden effects named; {wrong} wrong names")
+    arms.count(case, parser.parse_args(), OUTSIDE)
 
 
 if __name__ == "__main__":

@@ -88,11 +88,9 @@ impl Effect for CableSpring {
     fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let j = place.first();
         // the pull is the same however far its friction reaches
-        let mut last: Option<(u8, Vec<Column>)> = None;
+        let mut last = Last::none();
         let of = |shape: &Shape| {
-            let most = order(shape);
-            let known = last.take().filter(|l| l.0 == most);
-            let (_, smooth) = last.insert(known.unwrap_or_else(|| (most, pull(cx, j, shape))));
+            let smooth = last.of(order(shape), || pull(cx, j, shape));
             with_friction(cx, j, shape, smooth.clone())
         };
         shapes.iter().map(of).collect()

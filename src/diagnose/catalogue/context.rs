@@ -8,6 +8,7 @@ use crate::diagnose::data::Data;
 use crate::diagnose::window::averaged;
 use crate::dynamics::Samples;
 use crate::mechanism::MechanismMotion;
+use crate::median::median;
 use crate::plant;
 use crate::robot::{JointTerm, Motion, Prior};
 use crate::signals::series::Series;
@@ -16,6 +17,16 @@ use std::sync::OnceLock;
 
 /// Step of the differences by which the torque of a joint is derived, rad or m, and of its rate.
 const STEP: f64 = 1e-5;
+
+/// Torques that a drive reports, over all records.
+pub(crate) struct Reported {
+    /// each, as a mean
+    pub torque: Vec<f64>,
+    /// largest absolute value
+    pub peak: f64,
+    /// median of the absolute values
+    pub median: f64,
+}
 
 /// State of the diagnosis that columns may depend on.
 pub struct Context<'a> {
@@ -33,6 +44,7 @@ pub struct Context<'a> {
     pub mass: Vec<Vec<Vec<f64>>>,
     /// how the torque of each joint changes with its position and velocity, once it was asked for (serial robots)
     slopes: Vec<OnceLock<[Vec<f64>; 2]>>,
+    reported: Vec<OnceLock<Reported>>,
     /// what the robot exerts on its base, once it was asked for
     base: OnceLock<base_compliance::Load>,
     /// what other geometry changes, once it was asked for
@@ -47,10 +59,7 @@ impl<'a> Context<'a> {
     pub fn new(data: &'a Data<'a>, phi: Vec<f64>) -> crate::error::Result<Self> {
         let model = data.model_torque(&phi);
         let rigid = data.rigid_torque(&phi);
-        let peak = rigid
-            .iter()
-            .map(|r| r.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-9))
-            .collect();
+        let largest = rigid.iter().map(|r| peak(r)).collect();
         let mut mass = Vec::new();
         if Robots::Open.hold(data.plant) {
             for j in 0..data.joints() {
@@ -72,9 +81,10 @@ impl<'a> Context<'a> {
             phi,
             model,
             rigid,
-            peak,
+            peak: largest,
             mass,
             slopes: (0..data.joints()).map(|_| OnceLock::new()).collect(),
+            reported: (0..data.joints()).map(|_| OnceLock::new()).collect(),
             base: OnceLock::new(),
             deformations: OnceLock::new(),
         })
@@ -100,6 +110,18 @@ impl<'a> Context<'a> {
                     _ => Vec::new(),
                 }
             })
+        })
+    }
+
+    /// Torques that a drive reports.
+    pub(crate) fn reported(&self, j: usize) -> &Reported {
+        self.reported[j].get_or_init(|| {
+            let torque = self.data.each(|r, _| smooth(r.torque(j)));
+            Reported {
+                peak: peak(&torque),
+                median: median(torque.iter().map(|u| u.abs())),
+                torque,
+            }
         })
     }
 
@@ -320,6 +342,27 @@ pub(crate) fn smooth(x: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; x.len()];
     averaged(x, &mut out);
     out
+}
+
+/// Largest absolute value, but at least 1e-9: it may be divided by.
+pub(crate) fn peak(x: &[f64]) -> f64 {
+    x.iter().fold(1e-9, |m, v| m.max(v.abs()))
+}
+
+/// What was made for a key last.
+pub(crate) struct Last<K, V>(Option<(K, V)>);
+
+impl<K: PartialEq, V> Last<K, V> {
+    /// Nothing yet.
+    pub fn none() -> Self {
+        Last(None)
+    }
+
+    /// That of a key, made where the last one was another.
+    pub fn of(&mut self, key: K, make: impl FnOnce() -> V) -> &V {
+        let known = self.0.take().filter(|l| l.0 == key);
+        &self.0.insert(known.unwrap_or_else(|| (key, make()))).1
+    }
 }
 
 /// `count` numbers from `a` to `b` in equal ratios.

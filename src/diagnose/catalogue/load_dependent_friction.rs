@@ -14,7 +14,7 @@ impl LoadDependentFriction {
         match form {
             MOTOR => {
                 let load = &cx.model[j];
-                let largest = load.iter().fold(1e-9f64, |m, v| m.max(v.abs()));
+                let largest = peak(load);
                 (load, largest)
             }
             _ => (&cx.rigid[j], cx.peak[j]),

@@ -55,7 +55,7 @@ use crate::export::{Form, Part, simulator};
 use crate::plant;
 use crate::robot::{Inertia, JointTerm, Motion, Robot};
 use crate::signals::series::Series;
-use context::{closed_column, ladder, projected, prune, smooth};
+use context::{Last, closed_column, ladder, peak, projected, prune, smooth};
 use estimate::{constant, value};
 
 /// What is known about an effect, for reports and documentation.
@@ -177,7 +177,7 @@ pub trait Effect: Sync {
     fn explains_itself(&self, _shape: &Shape) -> bool {
         false
     }
-    /// Whether its friction changes most about the reversals of its joint: what the formula of a large one misses there looks like
+    /// Whether it is dry friction, which turns at the reversals of its joint: what the formula of a large one misses there looks like
     /// another one.
     fn at_reversals(&self, _shape: &Shape) -> bool {
         false

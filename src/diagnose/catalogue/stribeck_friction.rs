@@ -98,14 +98,12 @@ impl Effect for StribeckFriction {
     fn drafts(&self, cx: &Context, place: &Place, shapes: &[Shape]) -> Vec<Vec<Column>> {
         let j = place.first();
         // by how much bristles make Coulomb friction late is the same for every Stribeck velocity
-        let mut last: Option<(f64, Column)> = None;
+        let mut last = Last::none();
         let of = |shape: &Shape| {
             let mut all = vec![rise(cx, j, shape)];
             if shape.form == BRISTLES {
                 let reach = shape[2];
-                let known = last.take().filter(|l| l.0 == reach);
-                let (_, late) = last
-                    .insert(known.unwrap_or_else(|| (reach, Bristles::late(cx, j, DAHL, reach))));
+                let late = last.of(reach, || Bristles::late(cx, j, DAHL, reach));
                 all.push(late.clone());
             }
             all

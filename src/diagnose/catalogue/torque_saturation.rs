@@ -1,7 +1,6 @@
 //! A motor that gives less torque per current at high torque, or a limited torque.
 
 use super::*;
-use crate::median::median;
 
 /// Saturation of the torque constant.
 pub struct TorqueSaturation;
@@ -14,11 +13,6 @@ const LIMIT: u8 = 1;
 /// what is asked for there, so the loss is one of what is reported.
 const TENDS: u8 = 2;
 
-/// Largest absolute value.
-fn peak(x: &[f64]) -> f64 {
-    x.iter().fold(1e-9, |m, v| m.max(v.abs()))
-}
-
 /// Most of it that a drive may lose at half of all times: one that is at its limit then moves no robot as it is told, and what is
 /// lost is the torque itself.
 const AT_MEDIAN: f64 = 0.1;
@@ -26,11 +20,6 @@ const AT_MEDIAN: f64 = 0.1;
 /// Share of a torque that is lost where it tends to a limit, from their ratio.
 fn lost(ratio: f64, sharp: f64) -> f64 {
     1.0 - (1.0 + ratio.powf(sharp)).powf(-1.0 / sharp)
-}
-
-/// Torques that the drive of a joint reports.
-fn reported(cx: &Context, j: usize) -> Vec<f64> {
-    cx.data.each(|r, _| smooth(r.torque(j)))
 }
 
 impl Effect for TorqueSaturation {
@@ -85,12 +74,12 @@ impl Effect for TorqueSaturation {
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let j = e.place.first();
         if e.shape.form == TENDS {
-            let top = peak(&reported(cx, j));
-            let [limit, sharp] = [e.shape[0] * top, e.shape[1]];
+            let [limit, sharp] = [e.shape[0], e.shape[1]];
             // no more than twice what was seen
-            let far = 2.0 * top / limit;
-            let far = py(far / (1.0 + far.powf(sharp)).powf(1.0 / sharp));
-            let [limit, sharp, loss] = [limit, sharp, e.eta[0].min(1.0)].map(py);
+            let far = 2.0 / limit;
+            let far = far * (1.0 - lost(far, sharp));
+            let limit = limit * cx.reported(j).peak;
+            let [limit, sharp, loss, far] = [limit, sharp, e.eta[0].min(1.0), far].map(py);
             let lines = vec![
                 format!("made = xp.abs(tau) / {limit}"),
                 format!("within = xp.clip(made, 0.0, {far})"),
@@ -120,10 +109,10 @@ impl Effect for TorqueSaturation {
     fn columns(&self, cx: &Context, place: &Place, shape: &Shape, _draft: bool) -> Vec<Column> {
         let j = place.first();
         if shape.form == TENDS {
-            let all = reported(cx, j);
-            let limit = shape[0] * peak(&all);
+            let all = cx.reported(j);
+            let limit = shape[0] * all.peak;
             let loss = |u: &f64| u * lost((u / limit).abs(), shape[1]);
-            return vec![Column::on(j, all.iter().map(loss).collect())];
+            return vec![Column::on(j, all.torque.iter().map(loss).collect())];
         }
         let peak = peak(&cx.model[j]);
         let values = cx.model[j]
@@ -146,8 +135,8 @@ impl Effect for TorqueSaturation {
         match shape.form {
             // its formula has the size of the loss in it
             TENDS => {
-                let all = reported(cx, place.first());
-                let ratio = median(all.iter().map(|u| u.abs())) / (shape[0] * peak(&all));
+                let all = cx.reported(place.first());
+                let ratio = all.median / (shape[0] * all.peak);
                 (0.6..1.5).contains(&eta[0]) && shape[1] > 1.0 && lost(ratio, shape[1]) < AT_MEDIAN
             }
             _ => eta[0] > 0.0,
@@ -164,7 +153,7 @@ impl Effect for TorqueSaturation {
         let j = place.first();
         let unit = cx.torque_unit(j);
         if shape.form == TENDS {
-            let top = peak(&reported(cx, j));
+            let top = cx.reported(j).peak;
             let loss = lost(1.0 / shape[0], shape[1]);
             return vec![
                 value("loss_at_peak", eta[0] * loss, std[0] * loss, ""),

@@ -32,8 +32,13 @@ def torque(q, dq, load, dt, memory, xp=np):
 
 def reported(tau, xp=np):
     """Torque that the drives report where they make tau (..., joints), N m or N, without their delay."""
+    return told_by(DRIVES, tau, xp)
+
+
+def told_by(drives, tau, xp):
+    """The same of some drives only."""
     out = [tau[..., j] for j in range(len(JOINTS))]
-    for j, f, _ in DRIVES:
+    for j, f, _ in drives:
         out[j] = out[j] + f(tau[..., j], xp) - tau[..., j]
     return xp.stack(out, -1)
 
@@ -43,25 +48,20 @@ def command(told, xp=np):
 
     They have the gains and delays of the drives; what they have not is taken off here, N m or N.
     """
-    drives = [(j, f) for j, f, native in DRIVES if not native]
+    drives = [drive for drive in DRIVES if not drive[2]]
     if not drives:
         return told
-
-    def reports(tau):
-        out = [tau[..., j] for j in range(len(JOINTS))]
-        for j, f in drives:
-            out[j] = out[j] + f(tau[..., j], xp) - tau[..., j]
-        return xp.stack(out, -1)
 
     # they make no more than they report
     most, least = xp.abs(told), -xp.abs(told)
     for _ in range(60):
         tau = 0.5 * (least + most)
-        over = reports(tau) > told
+        over = told_by(drives, tau, xp) > told
         least, most = xp.where(over, least, tau), xp.where(over, tau, most)
     # the last step has a derivative
     tau, by = 0.5 * (least + most), 1e-4 + 1e-4 * xp.abs(told)
-    return tau + (told - reports(tau)) * 2.0 * by / (reports(tau + by) - reports(tau - by))
+    slope = (told_by(drives, tau + by, xp) - told_by(drives, tau - by, xp)) / (2.0 * by)
+    return tau + (told - told_by(drives, tau, xp)) / slope
 
 
 def recalled(memory, data, q):
