@@ -249,6 +249,16 @@ def saturated(t, q, dq, ddq):
     return tau
 
 
+def limited(t, q, dq, ddq):
+    """A drive that makes no more than its limit, which the largest torque of all records nearly is."""
+    tau = bodies(machine(), q, dq, ddq) + friction(dq)
+    top = max(np.abs((bodies(machine(), *x[1:]) + friction(x[2]))[:, 1]).max()
+              for x in (motion(seed, period, periods, top) for _, seed, period, periods, top in RECORDS))
+    limit = 1.002 * top
+    tau[:, 1] = limit * np.arctanh(tau[:, 1] / limit)
+    return tau
+
+
 def scaled(t, q, dq, ddq):
     tau = bodies(machine(), q, dq, ddq) + friction(dq)
     tau[:, 1] *= 1.12
@@ -318,6 +328,7 @@ EFFECTS = {
     "thermal_friction": warm,
     "torque_constant": scaled,
     "torque_saturation": saturated,
+    "torque_at_its_limit": limited,
     "cogging": added(lambda t, q, dq, ddq, r: [(1, 1.2 * np.sin(50 * q[:, 1] + 0.4))]),
     "transmission_error": wave(50.0, 4e-4, 0.3),
     "joint_elasticity": elastic("raise", 2000.0, 6.0),
@@ -393,13 +404,17 @@ def measure(folder, only):
             spec = importlib.util.spec_from_file_location(name, f"{out}/effects.py")
             effects = importlib.util.module_from_spec(spec)
             spec.loader.exec_module(effects)
+            # the actuators have gains and delays themselves
+            drives = [drive for drive in effects.DRIVES if not drive[2]]
+            for far in (1.0, 10.0):
+                # what is told is reported again, far beyond what was seen as well
+                again = effects.told_by(drives, effects.command(far * tau), np)
+                assert np.allclose(again, far * tau, rtol=1e-6, atol=1e-6), f"{name}: the command of a torque"
             ours = effects.inverse(model, q, dq, ddq, t[1] - t[0])
         else:
             model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
             ours = bodies(model, q, dq, ddq)
         nominal = bodies(machine(), q, dq, ddq) + friction(dq)
-        if name in MISSING:
-            pass
         gap, left = ((tau - nominal) ** 2).sum(), ((tau - ours) ** 2).sum()
         print(name, left / gap, flush=True)
 

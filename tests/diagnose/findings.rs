@@ -375,7 +375,7 @@ fn a_drive_at_its_limit() {
     let f = &d.findings[0];
     assert!(f.explains > 0.95, "explains {}", f.explains);
     let told = |name: &str| f.values.iter().find(|v| v.name == name).map(|v| v.value);
-    let close = |v: f64| (v / limit - 1.0).abs() < 0.2;
+    let close = |v: f64| (v / limit - 1.0).abs() < 0.05;
     assert!(
         told("limit").is_some_and(close),
         "{:?} for {limit}",

@@ -122,6 +122,7 @@ fn every_effect_in_mujoco_drives() {
     left_in_mujoco(&[
         "torque_constant",
         "torque_saturation",
+        "torque_at_its_limit",
         "torque_delay",
         "cogging",
     ]);

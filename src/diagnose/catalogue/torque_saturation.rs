@@ -17,9 +17,19 @@ const TENDS: u8 = 2;
 /// lost is the torque itself.
 const AT_MEDIAN: f64 = 0.1;
 
+/// Steps of the torque up to its peak, in which the formula for a simulator asks where its end is.
+const STEPS: f64 = 500.0;
+
 /// Share of a torque that is lost where it tends to a limit, from their ratio.
 fn lost(ratio: f64, sharp: f64) -> f64 {
     1.0 - (1.0 + ratio.powf(sharp)).powf(-1.0 / sharp)
+}
+
+/// The limit that a torque tends to, with which as much is lost at the peak `top` as was fitted there.
+fn limit(e: &Estimate, top: f64) -> f64 {
+    let [near, sharp] = [e.shape[0], e.shape[1]];
+    let left = (1.0 - e.eta[0] * lost(1.0 / near, sharp)).max(1e-3);
+    top / (left.powf(-sharp) - 1.0).powf(1.0 / sharp)
 }
 
 impl Effect for TorqueSaturation {
@@ -74,23 +84,25 @@ impl Effect for TorqueSaturation {
     fn element(&self, cx: &Context, e: &Estimate) -> Option<Element> {
         let j = e.place.first();
         if e.shape.form == TENDS {
-            let [limit, sharp] = [e.shape[0], e.shape[1]];
-            // no more than twice what was seen
-            let far = 2.0 / limit;
-            let far = far * (1.0 - lost(far, sharp));
-            let limit = limit * cx.reported(j).peak;
-            let [limit, sharp, loss, far] = [limit, sharp, e.eta[0].min(1.0), far].map(py);
+            let top = cx.reported(j).peak;
+            let (limit, sharp, loss) = (e.shape[0] * top, e.shape[1], e.eta[0]);
+            // up to twice what was seen; where no more is made from some torque on, the rest is reported within a thousandth of it
+            let made = |u: f64| u - loss * u * lost(u / limit, sharp);
+            let at = |k: usize| k as f64 * top / STEPS;
+            let steps = 2 * STEPS as usize;
+            let grows = (1..=steps).take_while(|k| made(at(*k)) > made(at(*k - 1)));
+            let end = grows.count().max(1);
+            let (rest, within) = (at(steps) - at(end), 1e-3 * made(at(end)));
+            let [limit, sharp, loss, end, rest, within] =
+                [limit, sharp, loss, at(end), rest, within].map(py);
             let lines = vec![
-                format!("made = xp.abs(tau) / {limit}"),
-                format!("within = xp.clip(made, 0.0, {far})"),
-                format!(
-                    "u = within / (1.0 - within ** {sharp}) ** (1.0 / {sharp}) + made - within"
-                ),
-                "for _ in range(8):".to_string(),
-                format!("    left = (1.0 + u ** {sharp}) ** (-1.0 / {sharp})"),
-                format!("    over = u - {loss} * (u - u * left) - made"),
-                format!("    u = u - over / (1.0 - {loss} * (1.0 - left / (1.0 + u ** {sharp})))"),
-                format!("return xp.sign(tau) * {limit} * u"),
+                format!("told = {end} * xp.linspace(0.0, 1.0, 401) ** 2"),
+                format!("left = (1.0 + (told / {limit}) ** {sharp}) ** (-1.0 / {sharp})"),
+                format!("made = told - {loss} * told * (1.0 - left)"),
+                "at = xp.abs(tau)".to_string(),
+                "beyond = xp.clip(at - made[-1], 0.0, None)".to_string(),
+                format!("flat = xp.minimum(beyond / {within}, 1.0) * {rest}"),
+                "return xp.sign(tau) * (xp.interp(at, made, told) + flat + beyond)".to_string(),
             ];
             return Some(Element::of(Kind::Drive, j, lines));
         }
@@ -158,7 +170,7 @@ impl Effect for TorqueSaturation {
             return vec![
                 value("loss_at_peak", eta[0] * loss, std[0] * loss, ""),
                 constant("exponent", shape[1], ""),
-                constant("limit", shape[0] * top, unit),
+                constant("limit", limit(e, top), unit),
                 constant("peak", top, unit),
             ];
         }
