@@ -89,6 +89,21 @@ impl Error {
         }
     }
 
+    /// The same error once more, for what failed once and is asked for again.
+    pub(crate) fn again(&self) -> Self {
+        match self {
+            Error::Io { path, source } => Error::file(path, "", source.to_string()),
+            Error::File {
+                file,
+                place,
+                message,
+            } => Error::file(file, place, message),
+            Error::Argument(message) => Error::Argument(message.clone()),
+            Error::Infeasible(message) => Error::Infeasible(message.clone()),
+            Error::Exists(path) => Error::Exists(path.clone()),
+        }
+    }
+
     /// Whether this is a mistake in the arguments (exit status 2) rather than something that
     /// could not be done (exit status 1).
     pub fn is_argument(&self) -> bool {

@@ -70,13 +70,28 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         (1, _) => format!("With {them} and one less sure effect of the table, "),
         _ => format!("With {them} and the less sure effects of the table, "),
     };
+    // a verdict that all is explained with much left rests on how small that is
+    let small = |share: f64| d.verdict == Verdict::Explained && share > T.gap.unexplained;
     let left = match held.filter(|h| *h > d.unexplained + 0.1) {
         Some(held) => format!(
-            "{with}{} of the gap stays on records held out, {} on those that were fitted",
+            "{with}{} of the gap stays on records held out, {} on those that were fitted{}",
             percent(held.min(1.0)),
-            percent(d.unexplained)
+            percent(d.unexplained),
+            if small(held) {
+                "; neither is far above the noise"
+            } else {
+                ""
+            }
         ),
-        None => format!("{with}{} of the gap stays", percent(d.unexplained)),
+        None => format!(
+            "{with}{} of the gap stays{}",
+            percent(d.unexplained),
+            if small(d.unexplained) {
+                ", not far above the noise"
+            } else {
+                ""
+            }
+        ),
     };
     let left = match (d.stays_on.as_slice(), d.friction_found) {
         ([], _) => left,

@@ -257,16 +257,16 @@ impl Data<'_> {
     }
 
     /// Weights `1/√(1 + (κ F_c/σ)² b)` of the rows of an actuator: where its velocity changes sign
-    /// (`b = 1` within `reversals.near`, 0 from twice that on), friction bends the motion faster than the
+    /// (`b = 1` within `reversals.near` and `reversals.unseen` samples, 0 from twice that on), friction bends the motion faster than the
     /// positions show, and the model is off by a share `κ` of the friction.
     fn doubt(&self, j: usize, coulomb: f64) -> Vec<f64> {
-        let near = T.reversals.near;
         let noise = self.noise[j].std.max(1e-300);
         let doubt = (T.reversals.bent * coulomb / noise).powi(2);
         // where the velocity is within its noise even the sign of friction is open
         let open = (coulomb / noise).powi(2);
         self.each(|r, _| {
             let v = r.state(j).1;
+            let near = T.reversals.near.max(T.reversals.unseen * r.dt);
             let mut away = vec![f64::INFINITY; v.len()];
             let crossed = |i: usize| i + 1 < v.len() && v[i] * v[i + 1] <= 0.0;
             for i in (0..v.len()).filter(|i| crossed(*i)) {

@@ -67,7 +67,8 @@ pub struct Plant {
     mechanism: Option<Arc<Mechanism>>,
     /// whether collisions are looked at
     collisions: bool,
-    scene: Arc<OnceLock<Option<Arc<Scene>>>>,
+    /// what [`Plant::scene`] found, or why there is none
+    scene: Arc<OnceLock<Result<Option<Arc<Scene>>>>>,
 }
 
 impl From<Robot> for Plant {
@@ -177,8 +178,10 @@ impl Plant {
     /// ([`Robot::with_assumed_limits`]). The workspace of a closed chain is always stated.
     pub fn with_assumed_limits(self) -> Self {
         match self.mechanism {
+            // the postures of its scene have these limits already
             None => Plant {
                 collisions: self.collisions,
+                scene: self.scene,
                 ..self.robot.with_assumed_limits().into()
             },
             Some(_) => self,

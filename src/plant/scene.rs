@@ -3,7 +3,7 @@
 use super::Plant;
 use crate::collision::clearance::{Fineness, Path, clearances};
 use crate::collision::{Clearance, Scene, build};
-use crate::error::{Result, Warning, WarningKind};
+use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::{Joint, Robot};
 use crate::trajectory::Fourier;
 use crate::trajectory::certificate::Proof;
@@ -71,7 +71,8 @@ impl Plant {
     }
 
     /// Volumes, obstacles and pairs that must stay apart; `None` where the robot's files tell no volume, or
-    /// collisions are not to be looked at, and for closed chains. Meshes are opened at the first call.
+    /// collisions are not to be looked at, and for closed chains. Meshes are opened at the first call, which also settles that
+    /// there is an error.
     ///
     /// # Errors
     /// As [`build::scene`].
@@ -79,11 +80,14 @@ impl Plant {
         if !self.collisions || self.mechanism().is_some() {
             return Ok(None);
         }
-        if let Some(known) = self.scene.get() {
-            return Ok(known.clone());
-        }
-        let found = build::scene(self.robot(), &postures(self.robot()))?.map(Arc::new);
-        Ok(self.scene.get_or_init(|| found).clone())
+        let known = match self.scene.get() {
+            Some(known) => known,
+            None => {
+                let found = build::scene(self.robot(), &postures(self.robot()));
+                (self.scene).get_or_init(|| found.map(|s| s.map(Arc::new)))
+            }
+        };
+        known.as_ref().map(Option::clone).map_err(Error::again)
     }
 
     /// A robot of the same links with the volumes of this one's [`Plant::scene`], which can be tighter than those of its
@@ -241,5 +245,48 @@ impl Path for SeriesPath<'_> {
 
     fn duration(&self) -> f64 {
         self.fourier.period
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const URDF: &str = r#"<robot name="two">
+<link name="foot"><collision><geometry><box size="0.2 0.2 0.3"/></geometry></collision></link>
+<link name="upper"><inertial><mass value="2"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial></link>
+<link name="lower"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.03"/></inertial>
+<collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+<joint name="a" type="continuous"><parent link="foot"/><child link="upper"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/></joint>
+<joint name="b" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/></joint>
+</robot>"#;
+
+    fn two(margin: f64) -> Plant {
+        let toml = format!(
+            "name = \"two\"\nurdf = \"two.urdf\"\n[collision]\nmargin = {margin}\n\
+             [[obstacle]]\nkind = \"plane\"\nnormal = [0.0, 0.0, -1.0]\noffset = -0.8\n"
+        );
+        let robot = Robot::from_toml_str(&toml, URDF, "robot.toml").unwrap();
+        robot.into()
+    }
+
+    /// A scene takes seconds where meshes are to be enclosed, so it is looked for once, also where there is none and where a
+    /// design has filled limits in.
+    #[test]
+    fn a_scene_is_looked_for_once() {
+        let free = two(0.01);
+        let scene = free.scene().unwrap().unwrap();
+        let again = free.clone().with_assumed_limits().scene().unwrap().unwrap();
+        assert!(Arc::ptr_eq(&scene, &again));
+        let ends = |p: &Plant| postures(p.robot());
+        assert_eq!(ends(&free), ends(&free.clone().with_assumed_limits()));
+
+        // what is far enough from the floor is too near to the ceiling
+        let narrow = two(0.45);
+        let told = || narrow.scene().map(|s| s.is_some()).unwrap_err().to_string();
+        let why = told();
+        assert!(why.contains("free of contact"), "{why}");
+        assert!(narrow.scene.get().is_some_and(|s| s.is_err()));
+        assert_eq!(why, told());
     }
 }

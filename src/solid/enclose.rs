@@ -14,6 +14,12 @@ const BOX: f64 = 0.75;
 /// Directions of the first grid.
 const DIRECTIONS: usize = 160;
 
+/// Directions of that grid from which smaller and smaller turns are tried.
+const POLISHED: usize = 4;
+
+/// Points that are looked at side by side.
+const LANES: usize = 8;
+
 #[derive(Debug, Clone, Copy)]
 struct Capsule {
     from: V,
@@ -168,15 +174,19 @@ fn smallest_box(points: &[V]) -> Shape {
 fn capsule(points: &[V]) -> Capsule {
     let mut tries: Vec<V> = principal_axes(points).to_vec();
     tries.extend((0..DIRECTIONS).map(|k| half_sphere(k, DIRECTIONS)));
-    let mut found: Vec<(f64, V, Capsule)> = tries
-        .into_iter()
-        .map(|u| {
-            let c = along(points, &u);
-            (c.volume(), u, c)
-        })
-        .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let polished = found.iter().take(4).map(|(volume, u, c)| {
+    let mut tries: Vec<Along> = tries.iter().map(|u| Along::new(points, u)).collect();
+    tries.sort_by(|a, b| a.bound.total_cmp(&b.bound));
+    let mut found: Vec<(f64, V, Capsule)> = Vec::with_capacity(tries.len());
+    for along in &tries {
+        // none of the others is among the best
+        if found.len() >= POLISHED && along.bound >= found[POLISHED - 1].0 {
+            break;
+        }
+        let c = along.smallest();
+        let at = found.partition_point(|f| f.0 <= c.volume());
+        found.insert(at, (c.volume(), along.axis, c));
+    }
+    let polished = found.iter().take(POLISHED).map(|(volume, u, c)| {
         let (mut volume, mut u, mut c) = (*volume, *u, *c);
         let mut step = 0.1;
         while step > 1e-4 {
@@ -184,7 +194,9 @@ fn capsule(points: &[V]) -> Capsule {
             let near = [e, -e, f, -f].map(|d| (u + d * step).normalize());
             let best = near
                 .into_iter()
-                .map(|v| (v, along(points, &v)))
+                .map(|v| Along::new(points, &v))
+                .filter(|along| along.bound < volume)
+                .map(|along| (along.axis, along.smallest()))
                 .min_by(|a, b| a.1.volume().total_cmp(&b.1.volume()));
             match best {
                 Some((v, k)) if k.volume() < volume * (1.0 - 1e-9) => {
@@ -210,57 +222,93 @@ fn capsule(points: &[V]) -> Capsule {
     c
 }
 
-/// The smallest capsule with an axis along `u`.
-fn along(points: &[V], u: &V) -> Capsule {
-    let [e, f] = across(u);
-    let flat: Vec<[f64; 2]> = points.iter().map(|p| [e.dot(p), f.dot(p)]).collect();
-    let (centre, least) = smallest_circle(&flat);
-    let base = e * centre[0] + f * centre[1];
-    let seen: Vec<(f64, f64)> = points
-        .iter()
-        .zip(&flat)
-        .map(|(p, q)| {
+/// Points seen along an axis, and what every capsule along it has at least.
+struct Along {
+    axis: V,
+    /// where the axis of the thinnest one passes, and its radius
+    base: V,
+    least: f64,
+    /// place along the axis and squared distance from it, whole rows of lanes
+    seen: Vec<[f64; 2]>,
+    /// no capsule along the axis has less volume
+    bound: f64,
+}
+
+impl Along {
+    fn new(points: &[V], u: &V) -> Self {
+        let [e, f] = across(u);
+        let flat: Vec<[f64; 2]> = points.iter().map(|p| [e.dot(p), f.dot(p)]).collect();
+        let (centre, least) = smallest_circle(&flat);
+        let at = |(p, q): (&V, &[f64; 2])| {
             let d2 = (q[0] - centre[0]).powi(2) + (q[1] - centre[1]).powi(2);
-            (u.dot(p), d2)
-        })
-        .collect();
-    let of = |radius: f64| -> Capsule {
-        let (mut a, mut b) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (t, d2) in &seen {
-            let h = (radius * radius - d2).max(0.0).sqrt();
-            a = a.min(t + h);
-            b = b.max(t - h);
+            [u.dot(p), d2]
+        };
+        let mut seen: Vec<[f64; 2]> = points.iter().zip(&flat).map(at).collect();
+        // the last point once more changes nothing
+        if let Some(last) = seen.last().copied() {
+            seen.resize(seen.len().next_multiple_of(LANES), last);
         }
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for [t, _] in &seen {
+            (low, high) = (low.min(*t), high.max(*t));
+        }
+        // a radius r reaches r beyond either end; what that leaves grows with r
+        let between = (high - low - 2.0 * least).max(0.0);
+        let bound = PI * least * least * between + 4.0 / 3.0 * PI * least.powi(3);
+        Along {
+            axis: *u,
+            base: e * centre[0] + f * centre[1],
+            least,
+            seen,
+            bound,
+        }
+    }
+
+    /// The shortest capsule of this radius.
+    fn of(&self, radius: f64) -> Capsule {
+        let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+        for row in self.seen.chunks_exact(LANES) {
+            for (k, [t, d2]) in row.iter().enumerate() {
+                let h = (radius * radius - d2).max(0.0).sqrt();
+                low[k] = low[k].min(t + h);
+                high[k] = high[k].max(t - h);
+            }
+        }
+        let mut a = low.into_iter().fold(f64::INFINITY, f64::min);
+        let mut b = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
         if a > b {
             (a, b) = (0.5 * (a + b), 0.5 * (a + b));
         }
         Capsule {
-            from: base + u * a,
-            to: base + u * b,
+            from: self.base + self.axis * a,
+            to: self.base + self.axis * b,
             radius,
         }
-    };
-    // golden section over the radius
-    let (mut lo, mut hi) = (least, 2.0 * least);
-    let g = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut x, mut y) = (hi - g * (hi - lo), lo + g * (hi - lo));
-    let (mut vx, mut vy) = (of(x).volume(), of(y).volume());
-    for _ in 0..24 {
-        if vx < vy {
-            (hi, y, vy) = (y, x, vx);
-            x = hi - g * (hi - lo);
-            vx = of(x).volume();
-        } else {
-            (lo, x, vx) = (x, y, vy);
-            y = lo + g * (hi - lo);
-            vy = of(y).volume();
-        }
     }
-    let (tight, best) = (of(least), of(0.5 * (lo + hi)));
-    if tight.volume() <= best.volume() {
-        tight
-    } else {
-        best
+
+    /// The smallest capsule: a golden section over the radius.
+    fn smallest(&self) -> Capsule {
+        let (mut lo, mut hi) = (self.least, 2.0 * self.least);
+        let g = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut x, mut y) = (hi - g * (hi - lo), lo + g * (hi - lo));
+        let (mut vx, mut vy) = (self.of(x).volume(), self.of(y).volume());
+        for _ in 0..24 {
+            if vx < vy {
+                (hi, y, vy) = (y, x, vx);
+                x = hi - g * (hi - lo);
+                vx = self.of(x).volume();
+            } else {
+                (lo, x, vx) = (x, y, vy);
+                y = lo + g * (hi - lo);
+                vy = self.of(y).volume();
+            }
+        }
+        let (tight, best) = (self.of(self.least), self.of(0.5 * (lo + hi)));
+        if tight.volume() <= best.volume() {
+            tight
+        } else {
+            best
+        }
     }
 }
 
@@ -303,7 +351,8 @@ fn smallest_circle(points: &[[f64; 2]]) -> ([f64; 2], f64) {
         list.swap(i, (state >> 33) as usize % (i + 1));
     }
     let inside = |c: &([f64; 2], f64), p: &[f64; 2]| {
-        (p[0] - c.0[0]).hypot(p[1] - c.0[1]) <= c.1 * (1.0 + 1e-12) + 1e-15
+        let (x, y) = (p[0] - c.0[0], p[1] - c.0[1]);
+        x * x + y * y <= (c.1 * (1.0 + 1e-12) + 1e-15).powi(2)
     };
     let mut c = (list.first().copied().unwrap_or_default(), 0.0);
     for i in 1..list.len() {

@@ -171,7 +171,7 @@ class Machine:
             "stribeck_friction": lambda: -0.1 * s * np.exp(-abs(v / (0.06 * top))) * sharp,
             "cable_spring": lambda: -s * (0.12 * (q - self.middle[j] - 0.2) + 0.05 * (q - self.middle[j]) ** 3),
             "load_dependent_friction": lambda: -0.12 * abs(u) * sharp,
-            "friction_asymmetry": lambda: -(v > 0) * s * (0.1 * sharp + 0.05 * v / top),
+            "friction_asymmetry": lambda: -float(v > 0) * s * (0.1 * sharp + 0.05 * v / top),
             "nonlinear_viscous_friction": lambda: -0.15 * s * v * abs(v) / top**2,
             "torque_offset": lambda: -0.08 * s,
             "torque_saturation": lambda: -0.25 * u * abs(u) / s,

@@ -349,9 +349,14 @@ fn a_term_that_changed_since_it_was_identified() {
     let sound = named(None);
     assert_eq!(sound.verdict, Verdict::NoGap, "{:?}", claims(&sound));
     for (effect, term, by) in changes {
-        let d = named(Some((term, by)));
+        let mut d = named(Some((term, by)));
         assert_eq!(claims(&d), [(effect, vec![1])], "{effect}");
         assert_eq!(d.verdict, Verdict::Explained, "{effect}");
+        // with the same verdict much may stay only where it does not count
+        assert!(!page::sentence(&d).1.contains("above the noise"));
+        d.unexplained = 0.7;
+        let said = page::sentence(&d).1;
+        assert!(said.contains("stays, not far above the noise."), "{said}");
         let whole = model.joints[1].terms[term as usize] + by;
         let told = d.findings[0].values[0].value;
         assert!((told - whole).abs() < 0.1, "{effect}: {told} for {whole}");
