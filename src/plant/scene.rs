@@ -3,7 +3,7 @@
 use super::Plant;
 use crate::collision::clearance::{Fineness, Path, clearances};
 use crate::collision::{Clearance, Scene, build};
-use crate::error::{Error, Result, Warning, WarningKind};
+use crate::error::{Result, Warning, WarningKind};
 use crate::robot::{Joint, Robot};
 use crate::trajectory::Fourier;
 use crate::trajectory::certificate::Proof;
@@ -87,7 +87,10 @@ impl Plant {
                 (self.scene).get_or_init(|| found.map(|s| s.map(Arc::new)))
             }
         };
-        known.as_ref().map(Option::clone).map_err(Error::again)
+        match known {
+            Ok(scene) => Ok(scene.clone()),
+            Err(why) => Err(why.again()),
+        }
     }
 
     /// A robot of the same links with the volumes of this one's [`Plant::scene`], which can be tighter than those of its
