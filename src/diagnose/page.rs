@@ -71,23 +71,18 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
         _ => format!("With {them} and the less sure effects of the table, "),
     };
     // a verdict that all is explained with much left rests on how small that is
-    let small = |share: f64| d.verdict == Verdict::Explained && share > T.gap.unexplained;
-    let left = match held.filter(|h| *h > d.unexplained + 0.1) {
-        Some(held) => format!(
-            "{with}{} of the gap stays on records held out, {} on those that were fitted{}",
-            percent(held.min(1.0)),
-            percent(d.unexplained),
-            if small(held) {
+    let apart = held.filter(|h| *h > d.unexplained + 0.1);
+    let stays = apart.unwrap_or(d.unexplained);
+    let little = d.verdict == Verdict::Explained && stays > T.gap.unexplained;
+    let most = apart.map_or(d.unexplained, |h| h.min(1.0));
+    let [whole, fitted] = [most, d.unexplained].map(percent);
+    let left = match (apart, little) {
+        (None, false) => format!("{with}{whole} of the gap stays"),
+        (None, true) => format!("{with}{whole} of the gap stays, not far above the noise"),
+        (Some(_), _) => format!(
+            "{with}{whole} of the gap stays on records held out, {fitted} on those that were fitted{}",
+            if little {
                 "; neither is far above the noise"
-            } else {
-                ""
-            }
-        ),
-        None => format!(
-            "{with}{} of the gap stays{}",
-            percent(d.unexplained),
-            if small(d.unexplained) {
-                ", not far above the noise"
             } else {
                 ""
             }

@@ -151,6 +151,15 @@ impl Plant {
         }
     }
 
+    /// Another plant of the same links, with what this one says and knows of collisions.
+    fn amid(&self, other: Plant) -> Self {
+        Plant {
+            collisions: self.collisions,
+            scene: self.scene.clone(),
+            ..other
+        }
+    }
+
     /// The same robot with these coordinates; with its own where none are named. Those of a tree,
     /// and of a closed chain without a platform, are always its actuators.
     ///
@@ -168,10 +177,7 @@ impl Plant {
                 )));
             }
         };
-        Ok(Plant {
-            collisions: self.collisions,
-            ..other
-        })
+        Ok(self.amid(other))
     }
 
     /// The same robot with the limits filled in that a design needs and a tree does not state
@@ -179,11 +185,7 @@ impl Plant {
     pub fn with_assumed_limits(self) -> Self {
         match self.mechanism {
             // the postures of its scene have these limits already
-            None => Plant {
-                collisions: self.collisions,
-                scene: self.scene,
-                ..self.robot.with_assumed_limits().into()
-            },
+            None => self.amid(self.robot.with_assumed_limits().into()),
             Some(_) => self,
         }
     }

@@ -54,11 +54,7 @@ impl Plant {
     /// # Panics
     /// As [`Plant::with_values`].
     pub(crate) fn valued(&self, phi: &[f64]) -> Plant {
-        Plant {
-            collisions: self.collisions,
-            scene: self.scene.clone(),
-            ..self.with_values(phi).into()
-        }
+        self.amid(self.with_values(phi).into())
     }
 
     /// The same robot with a load in the body that carries it ([`Plant::tool`]); unchanged where there is none.
@@ -75,11 +71,7 @@ impl Plant {
             }
             Some(mechanism) => Arc::unwrap_or_clone(mechanism).carrying(tool, load).into(),
         };
-        Plant {
-            collisions: self.collisions,
-            scene: self.scene.clone(),
-            ..other
-        }
+        self.amid(other)
     }
 
     /// The same robot with other breakaway friction of some actuators.
@@ -101,11 +93,7 @@ impl Plant {
                 mechanism.into()
             }
         };
-        Plant {
-            collisions: self.collisions,
-            scene: self.scene.clone(),
-            ..other
-        }
+        self.amid(other)
     }
 
     /// The same robot with its breakaway friction among what `identify` estimates, or not, for every actuator.
@@ -131,11 +119,6 @@ impl Plant {
                     .into()
             }
         };
-        Plant {
-            collisions: self.collisions,
-            scene: self.scene.clone(),
-            ..plain
-        }
-        .with_terms(&JointTerm::FRICTION)
+        self.amid(plain).with_terms(&JointTerm::FRICTION)
     }
 }

@@ -5,6 +5,7 @@
 
 The effects stand here in formulas of their own; nothing of the files under test makes the logs.
 """
+import functools
 import importlib.util
 import os
 import sys
@@ -249,12 +250,17 @@ def saturated(t, q, dq, ddq):
     return tau
 
 
+@functools.cache
+def largest():
+    """Largest torque of the second joint over all records."""
+    motions = (motion(seed, period, periods, top) for _, seed, period, periods, top in RECORDS)
+    return max(np.abs((bodies(machine(), *x[1:]) + friction(x[2]))[:, 1]).max() for x in motions)
+
+
 def limited(t, q, dq, ddq):
-    """A drive that makes no more than its limit, which the largest torque of all records nearly is."""
+    """A drive that makes no more than its limit, which the largest torque nearly is."""
     tau = bodies(machine(), q, dq, ddq) + friction(dq)
-    top = max(np.abs((bodies(machine(), *x[1:]) + friction(x[2]))[:, 1]).max()
-              for x in (motion(seed, period, periods, top) for _, seed, period, periods, top in RECORDS))
-    limit = 1.002 * top
+    limit = 1.002 * largest()
     tau[:, 1] = limit * np.arctanh(tau[:, 1] / limit)
     return tau
 

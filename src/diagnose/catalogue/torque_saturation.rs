@@ -18,7 +18,7 @@ const TENDS: u8 = 2;
 const AT_MEDIAN: f64 = 0.1;
 
 /// Steps of the torque up to its peak, in which the formula for a simulator asks where its end is.
-const STEPS: f64 = 500.0;
+const STEPS: usize = 500;
 
 /// Share of a torque that is lost where it tends to a limit, from their ratio.
 fn lost(ratio: f64, sharp: f64) -> f64 {
@@ -88,11 +88,10 @@ impl Effect for TorqueSaturation {
             let (limit, sharp, loss) = (e.shape[0] * top, e.shape[1], e.eta[0]);
             // up to twice what was seen; where no more is made from some torque on, the rest is reported within a thousandth of it
             let made = |u: f64| u - loss * u * lost(u / limit, sharp);
-            let at = |k: usize| k as f64 * top / STEPS;
-            let steps = 2 * STEPS as usize;
-            let grows = (1..=steps).take_while(|k| made(at(*k)) > made(at(*k - 1)));
+            let at = |k: usize| top * k as f64 / STEPS as f64;
+            let grows = (1..=2 * STEPS).take_while(|k| made(at(*k)) > made(at(*k - 1)));
             let end = grows.count().max(1);
-            let (rest, within) = (at(steps) - at(end), 1e-3 * made(at(end)));
+            let (rest, within) = (at(2 * STEPS) - at(end), 1e-3 * made(at(end)));
             let [limit, sharp, loss, end, rest, within] =
                 [limit, sharp, loss, at(end), rest, within].map(py);
             let lines = vec![
