@@ -50,9 +50,9 @@ pub fn apart(
         }
         e > ERROR * ERROR * t
     };
-    let found: Vec<_> = followers(&names, &traces)
+    let found: Vec<_> = followers(&names, &traces, large)
         .into_iter()
-        .filter(|f| f.share > SHARE && large(f.actuator))
+        .filter(|f| f.share > SHARE)
         .collect();
     if found.is_empty() {
         return Ok((None, Vec::new()));

@@ -28,10 +28,12 @@ use crate::base::BaseParameters;
 use crate::error::{Result, Warning, WarningKind};
 use crate::log::{Purpose, Record};
 use crate::plant::Plant;
-use faer::Mat;
+use crate::signals::fourier;
+use faer::{ColRef, Mat};
+use std::borrow::Cow;
 
 /// Rows that are factored at once, over the columns.
-const CHUNK: usize = 4;
+const CHUNK: usize = 8;
 
 /// Condenses records, those for the fit and the holdout ones apart.
 ///
@@ -85,12 +87,14 @@ pub(super) fn of_records(
     correlated: bool,
     mut warnings: Vec<Warning>,
 ) -> Result<Factor> {
-    let all = Equations::new(plant, base, &settings.signals, records)?;
+    let mut all = Equations::new(plant, base, &settings.signals, records)?;
     warnings.extend(all.prepared.iter().flat_map(|p| p.warnings.clone()));
     let (mut a, mut folds) = part(&[], FOLDS);
     let mut together = None;
-    if all.records.iter().any(|r| r.purpose == Purpose::Fit) {
-        let mut fit = all.fit()?;
+    let (fitted, others): (Vec<Stack>, Vec<Stack>) =
+        (std::mem::take(&mut all.stacks).into_iter()).partition(|s| s.purpose == Purpose::Fit);
+    if !fitted.is_empty() {
+        let mut fit = all.fit_of(fitted.into_iter().map(Cow::Owned).collect())?;
         warnings.extend(fit.unit_suspicions());
         fit.keep_moving(&mut warnings)?;
         let mut solved = Solved::new(&fit.stacks(), base.count())?;
@@ -118,14 +122,16 @@ pub(super) fn of_records(
             a.inflated += s.equations() as f64 * inflation;
         }
     }
-    let others: Vec<&Stack> = all
-        .stacks
-        .iter()
-        .filter(|s| s.purpose != Purpose::Fit)
-        .collect();
+    let others: Vec<&Stack> = others.iter().collect();
     let (b, tests) = part(&others, 1);
     let alone = [(&a, &folds), (&b, &tests)].map(|(part, each)| {
-        let of = |m: &Mat<f64>| columns_of(part, m).iter().map(triangle).collect();
+        let of = |m: &Mat<f64>| {
+            let columns = columns_of(part, m);
+            let alone = columns
+                .iter()
+                .map(|c| linear::factor(std::slice::from_ref(c)));
+            alone.collect()
+        };
         each.iter().map(of).collect()
     });
     let header = Header {
@@ -146,10 +152,6 @@ pub(super) fn of_records(
         together: together.unwrap_or_else(|| linear::factor(&folds)),
         alone,
     })
-}
-
-fn triangle(columns: &Mat<f64>) -> Mat<f64> {
-    linear::factor(std::slice::from_ref(columns))
 }
 
 /// Records for the fit: condensed, and the estimate that this gives.
@@ -203,22 +205,22 @@ fn part(stacks: &[&Stack], folds: usize) -> (Part, Vec<Mat<f64>>) {
             let (from, to) = (f * s.count / folds, (f + 1) * s.count / folds);
             for start in (from..to).step_by((CHUNK * k).max(1)) {
                 let count = (CHUNK * k).min(to - start);
-                let mut rows = Mat::<f64>::zeros(count, k);
+                let above = sum.as_ref().map_or(0, Mat::nrows);
+                // at least square, so that the factor always has the same size
+                let mut rows = Mat::<f64>::zeros((above + count).max(k), k);
+                if let Some(sum) = &sum {
+                    rows.as_mut().subrows_mut(0, above).copy_from(sum);
+                }
                 for (j, &[a, c]) in columns.iter().enumerate() {
                     let from = a * s.count + start;
-                    match c < b {
-                        true => {
-                            let from = s.w.as_ref().subrows(from, count);
-                            rows.as_mut().col_mut(j).copy_from(from.col(c));
-                        }
-                        false => {
-                            let tau = &right[r][from..from + count];
-                            (0..count).for_each(|i| rows[(i, j)] = tau[i]);
-                        }
-                    }
+                    let from = match c < b {
+                        true => s.w.as_ref().subrows(from, count).col(c),
+                        false => ColRef::from_slice(&right[r][from..from + count]),
+                    };
+                    let mut to = rows.as_mut().subrows_mut(above, count).col_mut(j);
+                    to.copy_from(from);
                 }
-                let both: Vec<Mat<f64>> = sum.into_iter().chain([rows]).collect();
-                sum = Some(linear::factor(&both));
+                sum = Some(rows.qr().thin_R().to_owned());
             }
         }
         out.push(sum.unwrap_or_else(|| Mat::zeros(k, k)));
@@ -250,6 +252,6 @@ fn part(stacks: &[&Stack], folds: usize) -> (Part, Vec<Mat<f64>>) {
 fn inflation(stack: &Stack, weights: &Weights, pi: &[f64], rows: &Stack) -> Result<f64> {
     let factor = linear::factor(&linear::fold_factors(&[rows], weights, 1));
     let r = linear::solve(factor.as_ref())?.r;
-    let found = uncertainty::covariance(&[stack], weights, pi, r.as_ref())?;
+    let found = uncertainty::covariance_within(&[stack], weights, pi, r.as_ref(), fourier::quick)?;
     Ok(found.inflation.max(1.0))
 }

@@ -23,7 +23,7 @@
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::plant::{Column, Plant};
 use crate::robot::{Inertia, JointTerm};
-use faer::{Mat, MatRef, Side};
+use faer::{ColRef, Mat, MatRef, Side};
 use nalgebra::Matrix4;
 
 /// A body whose ten parameters are unknowns: its number and the unknown of each, where it has one.
@@ -344,10 +344,8 @@ pub fn solve(
         .map(|j| (0..c.nrows()).map(|i| c[(i, j)] * d[i]).sum())
         .collect();
     let data = |phi: &[f64]| -> f64 {
-        (0..c.nrows())
-            .map(|i| (0..p).map(|j| c[(i, j)] * phi[j]).sum::<f64>() - d[i])
-            .map(|e| 0.5 * e * e)
-            .sum()
+        let error = c * ColRef::from_slice(phi) - ColRef::from_slice(d);
+        0.5 * error.squared_norm_l2()
     };
     let total = |phi: &[f64]| {
         let distance = prior.divergence(phi);
@@ -360,9 +358,8 @@ pub fn solve(
     let mut value = total(&phi);
     let mut hessian = gram.clone();
     for _ in 0..200 {
-        let mut g: Vec<f64> = (0..p)
-            .map(|i| (0..p).map(|j| gram[(i, j)] * phi[j]).sum::<f64>() - right[i])
-            .collect();
+        let known = &gram * ColRef::from_slice(&phi);
+        let mut g: Vec<f64> = (0..p).map(|i| known[i] - right[i]).collect();
         hessian = gram.clone();
         prior.add(&phi, gamma, &mut g, &mut hessian);
         // unit diagonal, so that units do not cost digits

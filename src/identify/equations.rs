@@ -115,6 +115,15 @@ impl<'a> Equations<'a> {
     /// # Errors
     /// Fewer equations than base parameters.
     pub fn fit(&self) -> Result<Fit<'_>> {
+        let fitted = self.stacks.iter().filter(|s| s.purpose == Purpose::Fit);
+        self.fit_of(fitted.map(Cow::Borrowed).collect())
+    }
+
+    /// The same with equations that were taken out.
+    ///
+    /// # Errors
+    /// As [`Equations::fit`].
+    pub fn fit_of<'b>(&'b self, stacks: Vec<Cow<'b, Stack>>) -> Result<Fit<'b>> {
         let chosen: Vec<usize> = (0..self.records.len())
             .filter(|&k| self.records[k].purpose == Purpose::Fit)
             .collect();
@@ -124,10 +133,7 @@ impl<'a> Equations<'a> {
             signals: self.signals,
             records: chosen.iter().map(|&k| self.records[k]).collect(),
             prepared: chosen.iter().map(|&k| &self.prepared[k]).collect(),
-            stacks: chosen
-                .iter()
-                .map(|&k| Cow::Borrowed(&self.stacks[k]))
-                .collect(),
+            stacks,
         };
         let rows = fit.equations();
         if rows < self.base.count() {
@@ -176,9 +182,8 @@ impl Fit<'_> {
     /// # Errors
     /// A pose of a parallel robot that cannot be reached.
     pub fn keep_moving(&mut self, warnings: &mut Vec<Warning>) -> Result<()> {
-        let (moving, note) = standstill::left_out(self.plant, &self.stacks(), &self.prepared)?;
+        let note = standstill::leave_out(self.plant, &mut self.stacks, &self.prepared)?;
         warnings.extend(note);
-        self.replace(moving);
         Ok(())
     }
 
@@ -190,14 +195,10 @@ impl Fit<'_> {
     pub fn set_aside(&mut self, pi: &[f64], warnings: &mut Vec<Warning>) -> Result<bool> {
         let (freed, notes) = aside::apart(self.plant, &self.stacks(), &self.prepared, pi)?;
         warnings.extend(notes);
-        Ok(self.replace(freed))
-    }
-
-    fn replace(&mut self, stacks: Option<Vec<Stack>>) -> bool {
-        let new = stacks.is_some();
-        if let Some(stacks) = stacks {
+        let new = freed.is_some();
+        if let Some(stacks) = freed {
             self.stacks = stacks.into_iter().map(Cow::Owned).collect();
         }
-        new
+        Ok(new)
     }
 }

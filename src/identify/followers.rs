@@ -21,8 +21,13 @@ pub struct Follower {
 type Function = fn(f64, f64) -> f64;
 
 /// Looks, joint by joint, for the function of another joint's velocity that explains most of the
-/// residual, beyond what functions of its own velocity do. The shares below a tenth are left out.
-pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
+/// residual, beyond what functions of its own velocity do. The shares below a tenth are left out, and so are joints that are not
+/// asked for.
+pub fn followers(
+    names: &[String],
+    traces: &[Trace],
+    asked: impl Fn(usize) -> bool,
+) -> Vec<Follower> {
     let fitted: Vec<&Trace> = (traces.iter())
         .filter(|t| t.purpose == Purpose::Fit)
         .collect();
@@ -35,7 +40,7 @@ pub fn followers(names: &[String], traces: &[Trace]) -> Vec<Follower> {
         out
     };
     let mut out = Vec::new();
-    for a in 0..names.len() {
+    for a in (0..names.len()).filter(|a| asked(*a)) {
         let at = |t: &Trace, k: usize| a * t.time.len() + k;
         let e = all(&|t, k| t.measured[at(t, k)] - t.predicted[at(t, k)]);
         let power: f64 = e.iter().map(|v| v * v).sum();

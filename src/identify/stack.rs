@@ -73,6 +73,11 @@ impl Stack {
         let thin = p.thin.as_ref().zip(jumps.as_deref());
         let (stride, filter) = thin.map_or((1, &p.filter), |(t, _)| (t.stride, &t.filter));
         let each = (BLOCK.max(8 * filter.reach()) / filter.factor).max(16);
+        let structure = (jumps.is_some().then(|| structure(plant, base))).transpose()?;
+        let holds = |a: usize, c: usize, column: &[f64]| match &structure {
+            Some(all) => all[c * n + a],
+            None => column.iter().any(|x| *x != 0.0),
+        };
         let ranges: Vec<_> = (0..m)
             .step_by(each)
             .map(|from| from..(from + each).min(m))
@@ -94,7 +99,7 @@ impl Stack {
                     let column = &w[base.kept[c] * n * count..][..n * count];
                     for a in 0..n {
                         let from = &column[a * count..(a + 1) * count];
-                        if from.iter().any(|x| *x != 0.0) {
+                        if holds(a, c, from) {
                             let to = &mut to[a * outputs..(a + 1) * outputs];
                             filter.apply_part(from, range.clone(), to);
                         }
@@ -137,9 +142,10 @@ impl Stack {
                 let from = a * outputs;
                 known[to..to + outputs].copy_from_slice(&part.known[from..from + outputs]);
                 for c in 0..b {
-                    let from = c * n * outputs + a * outputs;
-                    for k in 0..outputs {
-                        w[(to + k, c)] = part.w[from + k];
+                    let from = &part.w[c * n * outputs + a * outputs..][..outputs];
+                    if holds(a, c, from) {
+                        let mut to = w.as_mut().subrows_mut(to, outputs).col_mut(c);
+                        to.copy_from(faer::ColRef::from_slice(from));
                     }
                 }
             }
@@ -173,7 +179,12 @@ impl Stack {
 
     /// Number of equations of an actuator that count.
     pub fn used(&self, a: usize) -> usize {
-        let rows = &self.left_out[a * self.count..(a + 1) * self.count];
+        self.used_within(a, self.count)
+    }
+
+    /// The same among the first samples.
+    pub fn used_within(&self, a: usize, samples: usize) -> usize {
+        let rows = &self.left_out[a * self.count..][..samples];
         rows.iter().filter(|out| !**out).count()
     }
 
@@ -199,5 +210,58 @@ impl Stack {
         let predicted = self.predicted(pi);
         let pairs = self.measured.iter().zip(predicted);
         pairs.map(|(m, p)| m - p).collect()
+    }
+}
+
+/// Whether a base column holds anything in the equations of an actuator, column after column: what the links that it does not
+/// move weigh it never feels. Of a tree, from two postures and motions as good as any.
+fn structure(plant: &Plant, base: &BaseParameters) -> Result<Vec<bool>> {
+    let mut any = Samples::zeros(plant.coordinates(), 2);
+    let all = [&mut any.q, &mut any.qd, &mut any.qdd]
+        .into_iter()
+        .flatten();
+    all.enumerate()
+        .for_each(|(i, x)| *x = (1.0 + 0.7 * (i as f64).powf(1.3)).sin());
+    let w = plant.regressor_columns(&any)?;
+    let rows = w.len() / plant.parameters().len().max(1);
+    let columns = base.kept.iter().map(|c| &w[c * rows..(c + 1) * rows]);
+    let each = columns.flat_map(|column| column.chunks(any.count));
+    Ok(each.map(|x| x.iter().any(|x| *x != 0.0)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn what_a_column_holds_it_holds_in_all_motions() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for name in ["panda", "ur10", "scara", "planar2"] {
+            let plant = Plant::load(name)
+                .unwrap()
+                .with_terms(&crate::robot::JointTerm::FRICTION);
+            let base = plant.base().unwrap();
+            let found = structure(&plant, &base).unwrap();
+            let n = found.len() / base.count();
+            let mut x = Samples::zeros(plant.coordinates(), 40);
+            for all in [&mut x.q, &mut x.qd, &mut x.qdd] {
+                all.iter_mut()
+                    .for_each(|v| *v = rng.random_range(-2.0..2.0));
+            }
+            let w = plant.regressor_columns(&x).unwrap();
+            for (c, kept) in base.kept.iter().enumerate() {
+                for a in 0..n {
+                    let column = &w[kept * n * x.count + a * x.count..][..x.count];
+                    let largest = column.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                    // what rounding leaves may be zero or not
+                    if largest > 1e-12 || largest == 0.0 {
+                        assert_eq!(found[c * n + a], largest > 0.0, "{name}: {c} {a}");
+                    }
+                }
+            }
+            assert!(found.contains(&false), "{name}");
+        }
     }
 }

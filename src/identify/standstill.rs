@@ -11,31 +11,30 @@ use crate::error::{Result, Warning, WarningKind};
 use crate::plant::Plant;
 use crate::robot::JointTerm;
 use crate::signals::{Prepared, standstill};
+use std::borrow::Cow;
 
 /// Share of what the filter sees in which a joint is slow, beyond which it stands.
 const SHARE: f64 = 0.5;
 
-/// The fit records without the equations of joints that stand still, and what was left out; `None` where
-/// there is nothing to leave out.
+/// Leaves the equations of joints that stand still out of the fit records, and says which; `None` where there is nothing to
+/// leave out.
 ///
 /// # Errors
 /// A pose of a parallel robot that cannot be reached.
-pub fn left_out(
+pub fn leave_out(
     plant: &Plant,
-    fit: &[&Stack],
+    fit: &mut [Cow<'_, Stack>],
     prepared: &[&Prepared],
-) -> Result<(Option<Vec<Stack>>, Option<Warning>)> {
+) -> Result<Option<Warning>> {
     let joints = plant.actuators();
     let coulomb = JointTerm::Coulomb as usize;
     let dry: Vec<usize> = (0..joints.len())
         .filter(|&a| joints[a].identify[coulomb] || joints[a].terms[coulomb] != 0.0)
         .collect();
     if dry.is_empty() {
-        return Ok((None, None));
+        return Ok(None);
     }
-    // most records have nothing to leave out
-    let mut changed: Option<Vec<Stack>> = None;
-    for (r, p) in prepared.iter().enumerate() {
+    for (stack, p) in fit.iter_mut().zip(prepared) {
         let motion = plant.drive_motion(&p.motion)?;
         for &a in &dry {
             let row = a * p.count()..(a + 1) * p.count();
@@ -51,29 +50,24 @@ pub fn left_out(
             let still: Vec<f64> = slow.into_iter().map(f64::from).collect();
             for (k, share) in p.filter.apply(&still).into_iter().enumerate() {
                 if share > SHARE {
-                    let all =
-                        changed.get_or_insert_with(|| fit.iter().map(|s| (*s).clone()).collect());
-                    all[r].leave_out(a, k);
+                    stack.to_mut().leave_out(a, k);
                 }
             }
         }
     }
-    let Some(out) = changed else {
-        return Ok((None, None));
-    };
     let named: Vec<String> = dry
         .iter()
         .filter_map(|&a| {
-            let all: usize = out.iter().map(|s| s.count).sum();
-            let used: usize = out.iter().map(|s| s.used(a)).sum();
+            let all: usize = fit.iter().map(|s| s.count).sum();
+            let used: usize = fit.iter().map(|s| s.used(a)).sum();
             let percent = 100.0 * (all - used) as f64 / all as f64;
             (used < all).then(|| format!("{} {percent:.1} %", joints[a].name))
         })
         .collect();
     if named.is_empty() {
-        return Ok((None, None));
+        return Ok(None);
     }
-    let note = Warning::new(
+    Ok(Some(Warning::new(
         WarningKind::StandstillLeftOut,
         "standstill",
         format!(
@@ -81,6 +75,5 @@ pub fn left_out(
              value up to Coulomb's: {}",
             named.join(", ")
         ),
-    );
-    Ok((Some(out), Some(note)))
+    )))
 }

@@ -71,31 +71,49 @@ pub fn covariance(
     pi: &[f64],
     r: MatRef<'_, f64>,
 ) -> Result<Covariance> {
+    covariance_within(stacks, weights, pi, r, |count| count)
+}
+
+/// [`covariance`] with the spectra of the first samples of each record, as many as `within` says of its number: these stand for
+/// all of them.
+///
+/// # Errors
+/// Numbers that are not finite.
+pub(super) fn covariance_within(
+    stacks: &[&Stack],
+    weights: &Weights,
+    pi: &[f64],
+    r: MatRef<'_, f64>,
+    within: fn(usize) -> usize,
+) -> Result<Covariance> {
     let b = pi.len();
     let rows: usize = stacks.iter().map(|s| s.equations()).sum();
     let freedom = rows as f64 / (rows.saturating_sub(b)).max(1) as f64;
     let mut jobs = Vec::new();
     let right: Vec<Vec<f64>> = stacks.iter().map(|s| s.tau()).collect();
-    let plans: Vec<Plan> = stacks.iter().map(|s| Plan::new(s.count)).collect();
+    let plans: Vec<(usize, Plan)> = (stacks.iter().map(|s| within(s.count)))
+        .map(|count| (count, Plan::new(count)))
+        .collect();
     for (i, s) in stacks.iter().enumerate() {
         jobs.extend((0..s.actuators).map(|a| (i, a)));
     }
     let parts: Vec<Mat<f64>> = jobs
         .par_iter()
         .map(|&(i, a)| {
-            let m = stacks[i].count;
-            let plan = &plans[i];
+            let (m, plan) = &plans[i];
+            let m = *m;
             // of one actuator at a time: all of them would be as large as the equations
             let block = weighted_row(stacks[i], &right[i], i, weights, a);
             let column = |c: usize| -> Vec<f64> { (0..m).map(|k| block[(k, c)]).collect() };
             let residual: Vec<f64> = (0..m)
                 .map(|k| block[(k, b)] - (0..b).map(|c| block[(k, c)] * pi[c]).sum::<f64>())
                 .collect();
-            let density = smooth_spectrum(plan, residual, stacks[i].used(a));
+            let density = smooth_spectrum(plan, residual, stacks[i].used_within(a, m));
             let weight = |(k, density): (usize, &f64)| {
                 // frequencies between 0 and the highest stand for their mirror image too
                 let twice = if k == 0 || (2 * k == m) { 1.0 } else { 2.0 };
-                (twice * density / m as f64).sqrt()
+                let stands_for = stacks[i].count as f64 / m as f64;
+                (twice * density * stands_for / m as f64).sqrt()
             };
             let of_each: Vec<f64> = density.iter().enumerate().map(weight).collect();
             let mut z = Mat::<f64>::zeros(2 * of_each.len(), b);

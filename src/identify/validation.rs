@@ -136,7 +136,7 @@ pub fn validate(equations: &Equations, models: [&[f64]; 3]) -> Result<Validation
         plain: both(pi),
         essential: both(essential),
         nominal: both(&nominal),
-        followers: followers(&names, &traces),
+        followers: followers(&names, &traces, |_| true),
         traces,
     })
 }

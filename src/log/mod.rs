@@ -15,6 +15,7 @@
 //! or stuck or saturated channels) are interpolated where they must be, and marked in
 //! [`Record::valid`].
 
+mod abreast;
 pub(crate) mod channels;
 pub(crate) mod clock;
 mod experiment;

@@ -74,6 +74,13 @@ fn quotient(mantissa: u64, point: usize) -> f64 {
     (whole | u64::from(rest != 0)) as f64 * power
 }
 
+/// The same of no more than 15 digits, and of zero: both numbers are exact, and the quotient is rounded once.
+#[inline(always)]
+pub(super) fn quotient_of_few(mantissa: u64, point: usize) -> f64 {
+    // below 2⁵³, and signed numbers convert in one instruction
+    mantissa as i64 as f64 / POWERS[point]
+}
+
 /// The digits that start at a place of a text.
 #[inline(always)]
 fn decimal(text: &[u8], start: usize) -> Decimal {
@@ -222,7 +229,7 @@ fn short(text: &[u8], at: usize, delimiter: u8) -> Option<(f64, usize)> {
         return None;
     }
     let together = whole & ((1 << (8 * before)) - 1) | part << (8 * before);
-    let x = joined(together << (64 - 8 * all)) as f64 / POWERS[point];
+    let x = quotient_of_few(joined(together << (64 - 8 * all)), point);
     let sign = u64::from(negative) << 63;
     Some((f64::from_bits(x.to_bits() | sign), at + end))
 }

@@ -7,6 +7,7 @@
 //! the record turned about its end points, and the states start as for a constant input, as
 //! `scipy.signal.sosfiltfilt` does. At the cut-off the gain of both passes is one half.
 
+use crate::dynamics::lanes::Isa;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 
@@ -135,6 +136,7 @@ fn pass<const N: usize>(
 }
 
 /// [`pass`] of `W` signals, each with filters of its own: while one waits for its products, the others go on.
+#[inline(always)]
 fn side_by_side<const W: usize>(sections: [[Section; 2]; W], mut x: [&mut [f64]; W], back: bool) {
     let shared = x.iter().map(|x| x.len()).min().unwrap_or(0);
     let mut states: [[[f64; 2]; 2]; W] = std::array::from_fn(|l| {
@@ -183,13 +185,48 @@ fn side_by_side<const W: usize>(sections: [[Section; 2]; W], mut x: [&mut [f64];
     }
 }
 
-/// So many as one array.
-fn of<'a, const W: usize>(mut all: impl Iterator<Item = &'a mut [f64]>) -> [&'a mut [f64]; W] {
-    std::array::from_fn(|_| all.next().unwrap_or_default())
+/// [`side_by_side`] with the widest instructions of this machine; signals without a filter of their own have the first one.
+fn together<'a, const W: usize>(
+    isa: Isa,
+    filters: &[[Section; 2]],
+    mut all: impl Iterator<Item = &'a mut [f64]>,
+    back: bool,
+) {
+    let sections = std::array::from_fn(|l| filters[if l < filters.len() { l } else { 0 }]);
+    let x: [&mut [f64]; W] = std::array::from_fn(|_| all.next().unwrap_or_default());
+    match isa {
+        Isa::Scalar | Isa::Portable => side_by_side(sections, x, back),
+        #[cfg(all(target_arch = "x86_64", feature = "wide"))]
+        // SAFETY: the machine has AVX2
+        Isa::Avx2 => unsafe { side_by_side_avx2(sections, x, back) },
+        #[cfg(all(target_arch = "x86_64", feature = "wide"))]
+        // SAFETY: the machine has AVX-512
+        Isa::Avx512 => unsafe { side_by_side_avx512(sections, x, back) },
+    }
+}
+
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
+#[target_feature(enable = "avx2")]
+unsafe fn side_by_side_avx2<const W: usize>(
+    sections: [[Section; 2]; W],
+    x: [&mut [f64]; W],
+    back: bool,
+) {
+    side_by_side(sections, x, back);
+}
+
+#[cfg(all(target_arch = "x86_64", feature = "wide"))]
+#[target_feature(enable = "avx512f,avx512dq")]
+unsafe fn side_by_side_avx512<const W: usize>(
+    sections: [[Section; 2]; W],
+    x: [&mut [f64]; W],
+    back: bool,
+) {
+    side_by_side(sections, x, back);
 }
 
 /// Signals that are filtered side by side.
-const ABREAST: usize = 4;
+const ABREAST: usize = 8;
 
 /// [`Butterworth::zero_phase`] of as many signals as [`ABREAST`] or fewer, of one length, one after the other into `out`; each
 /// with its filter and the length of its continuation.
@@ -207,15 +244,17 @@ fn zero_phase_of(filters: &[(Butterworth, usize)], x: &[Vec<f64>], out: &mut [f6
     }
     let with_pad = |((_, pad), x): (&(_, usize), &Vec<f64>)| Butterworth::continued(x, *pad);
     let (mut y, pads): (Vec<Vec<f64>>, Vec<usize>) = filters.iter().zip(x).map(with_pad).unzip();
+    // as many as one instruction takes: some stand for nothing
+    let spare = pairs.len().next_power_of_two() - pairs.len();
+    let mut more: Vec<Vec<f64>> = y.iter().take(1).cycle().take(spare).cloned().collect();
     for back in [false, true] {
-        let y = y.iter_mut().map(Vec::as_mut_slice);
-        match *pairs {
-            [a, b, c, d] => side_by_side([a, b, c, d], of(y), back),
-            [a, b, c] => side_by_side([a, b, c], of(y), back),
-            [a, b] => side_by_side([a, b], of(y), back),
-            _ => y
-                .zip(&pairs)
-                .for_each(|(y, p)| side_by_side([*p], [y], back)),
+        let y = y.iter_mut().chain(&mut more).map(Vec::as_mut_slice);
+        let isa = Isa::detect();
+        match pairs.len() {
+            5.. => together::<8>(isa, &pairs, y, back),
+            3 | 4 => together::<4>(isa, &pairs, y, back),
+            2 => together::<2>(isa, &pairs, y, back),
+            _ => together::<1>(isa, &pairs, y, back),
         }
     }
     for ((y, pad), out) in y.iter().zip(pads).zip(rows) {
@@ -337,7 +376,7 @@ mod tests {
             .into_iter()
             .flat_map(|order| [0, 1, 2, 37, 1000].map(|n| (order, n)))
         {
-            for count in 0..9 {
+            for count in 0..18 {
                 let x = |k: usize| -> Vec<f64> {
                     let x = |i: usize| {
                         ((0.1 + 0.01 * k as f64) * i as f64).sin() + 0.1 * (i % 7) as f64

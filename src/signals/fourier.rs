@@ -82,6 +82,22 @@ impl Plan {
     }
 }
 
+/// The largest length up to this one that transforms quickly: even, with no prime factor above 5; four fifths of it or more, from
+/// four samples on.
+pub fn quick(count: usize) -> usize {
+    let smooth = |n: &usize| {
+        let mut rest = *n;
+        for prime in [2, 3, 5] {
+            while rest.is_multiple_of(prime) {
+                rest /= prime;
+            }
+        }
+        rest == 1
+    };
+    let mut even = (2..=count).rev().filter(|n| n.is_multiple_of(2));
+    even.find(smooth).unwrap_or(count)
+}
+
 /// Where a transform stands, and what it needs besides.
 struct Room {
     lines: Vec<Complex64>,
@@ -217,5 +233,29 @@ impl Welch {
     pub(super) fn frequencies(&self, rate: f64) -> Vec<f64> {
         let n = self.window.len();
         (0..n / 2 + 1).map(|k| k as f64 * rate / n as f64).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quick_lengths_are_near_and_have_small_factors() {
+        for count in 4..20_000 {
+            let n = quick(count);
+            assert!(
+                n <= count && 5 * n >= 4 * count && n.is_multiple_of(2),
+                "{count}"
+            );
+            let rest = [2, 3, 5].into_iter().fold(n, |mut n, prime| {
+                while n.is_multiple_of(prime) {
+                    n /= prime;
+                }
+                n
+            });
+            assert_eq!(rest, 1, "{count}");
+        }
+        assert_eq!([0, 1, 2, 3].map(quick), [0, 1, 2, 2]);
     }
 }

@@ -7,7 +7,7 @@
 use super::dialect::{Cell, Dialect, canonical, idle, stamp, strip};
 use super::{Each, Skip, source};
 use crate::error::{Error, Result, Warning, WarningKind, listed};
-use crate::log::{Table, number};
+use crate::log::{Table, abreast, number};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::io::Read;
@@ -491,10 +491,11 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> [Piece; 2
     let (a, b) = text.split_at(end.map_or(text.len(), |at| middle + at + 1));
     let [mut x, mut y] = [a, b].map(|text| empty(text, keep));
     let usual = |k: usize| keep[k] && cells[k] == Cell::Number;
-    let [p, q] = match (0..keep.len()).all(usual) {
-        true => abreast([a, b], delimiter, [&mut x, &mut y]),
-        false => [0, 0],
+    let ([p, q], rows) = match (0..keep.len()).all(usual) {
+        true => abreast::rows([a, b], delimiter, [&mut x.columns, &mut y.columns]),
+        false => ([0, 0], 0),
     };
+    (x.lines, y.lines) = (rows, rows);
     rest(a, p, delimiter, cells, keep, &mut x);
     rest(b, q, delimiter, cells, keep, &mut y);
     [x, y]
@@ -511,39 +512,6 @@ fn empty(text: &[u8], keep: &[bool]) -> Piece {
         bad: Vec::new(),
         count: 0,
         last: false,
-    }
-}
-
-/// Parses lines of two texts at the same time, as long as both are plain numbers: where a number ends is known late, and
-/// meanwhile the other one goes on. Returns where it stopped in each.
-fn abreast(texts: [&[u8]; 2], delimiter: u8, out: [&mut Piece; 2]) -> [usize; 2] {
-    let [x, y] = out;
-    let n = x.columns.len();
-    let mut row = vec![[0.0; 2]; n];
-    let mut brief = vec![[true; 2]; n];
-    let mut at = [0; 2];
-    loop {
-        let [mut p, mut q] = at;
-        for (k, (to, brief)) in row.iter_mut().zip(&mut brief).enumerate() {
-            let a = number::plain(texts[0], p, delimiter, &mut brief[0]);
-            let b = number::plain(texts[1], q, delimiter, &mut brief[1]);
-            let (Some((u, a)), Some((v, b))) = (a, b) else {
-                return at;
-            };
-            let last = k + 1 == n;
-            if (texts[0][a] == b'\n') != last || (texts[1][b] == b'\n') != last {
-                return at;
-            }
-            *to = [u, v];
-            (p, q) = (a + 1, b + 1);
-        }
-        at = [p, q];
-        for (k, [u, v]) in row.iter().enumerate() {
-            x.columns[k].push(*u);
-            y.columns[k].push(*v);
-        }
-        x.lines += 1;
-        y.lines += 1;
     }
 }
 
