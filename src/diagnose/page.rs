@@ -113,7 +113,8 @@ pub fn sentence(d: &Diagnosis) -> (Tone, String) {
                 },
         ),
         Verdict::Explained if sure => (
-            Tone::Good,
+            // much of a small gap is no full success
+            if little { Tone::Fair } else { Tone::Good },
             format!("Explained: {}. {left}.", names()),
         ),
         Verdict::Explained => (

@@ -348,19 +348,26 @@ fn a_term_that_changed_since_it_was_identified() {
     };
     let sound = named(None);
     assert_eq!(sound.verdict, Verdict::NoGap, "{:?}", claims(&sound));
+    let mut green = 0;
     for (effect, term, by) in changes {
         let mut d = named(Some((term, by)));
         assert_eq!(claims(&d), [(effect, vec![1])], "{effect}");
         assert_eq!(d.verdict, Verdict::Explained, "{effect}");
         // with the same verdict much may stay only where it does not count
-        assert!(!page::sentence(&d).1.contains("above the noise"));
+        let (tone, said) = page::sentence(&d);
+        assert!(!said.contains("above the noise"), "{said}");
+        let good = said.starts_with("Explained");
+        assert_eq!(format!("{tone:?}"), if good { "Good" } else { "Fair" });
+        green += usize::from(good);
         d.unexplained = 0.7;
-        let said = page::sentence(&d).1;
+        let (tone, said) = page::sentence(&d);
+        assert_eq!(format!("{tone:?}"), "Fair");
         assert!(said.contains("stays, not far above the noise."), "{said}");
         let whole = model.joints[1].terms[term as usize] + by;
         let told = d.findings[0].values[0].value;
         assert!((told - whole).abs() < 0.1, "{effect}: {told} for {whole}");
     }
+    assert!(green > 0, "none is sure");
 }
 
 /// What it reports grows far beyond what it makes. The torque that is missing is no torque that a drive would have to make.
