@@ -125,13 +125,7 @@ pub(super) fn of_records(
     let others: Vec<&Stack> = others.iter().collect();
     let (b, tests) = part(&others, 1);
     let alone = [(&a, &folds), (&b, &tests)].map(|(part, each)| {
-        let of = |m: &Mat<f64>| {
-            let columns = columns_of(part, m);
-            let alone = columns
-                .iter()
-                .map(|c| linear::factor(std::slice::from_ref(c)));
-            alone.collect()
-        };
+        let of = |m: &Mat<f64>| columns_of(part, m).iter().map(triangle).collect();
         each.iter().map(of).collect()
     });
     let header = Header {
@@ -152,6 +146,10 @@ pub(super) fn of_records(
         together: together.unwrap_or_else(|| linear::factor(&folds)),
         alone,
     })
+}
+
+fn triangle(columns: &Mat<f64>) -> Mat<f64> {
+    linear::factor(std::slice::from_ref(columns))
 }
 
 /// Records for the fit: condensed, and the estimate that this gives.
@@ -205,22 +203,17 @@ fn part(stacks: &[&Stack], folds: usize) -> (Part, Vec<Mat<f64>>) {
             let (from, to) = (f * s.count / folds, (f + 1) * s.count / folds);
             for start in (from..to).step_by((CHUNK * k).max(1)) {
                 let count = (CHUNK * k).min(to - start);
-                let above = sum.as_ref().map_or(0, Mat::nrows);
-                // at least square, so that the factor always has the same size
-                let mut rows = Mat::<f64>::zeros((above + count).max(k), k);
-                if let Some(sum) = &sum {
-                    rows.as_mut().subrows_mut(0, above).copy_from(sum);
-                }
+                let mut rows = Mat::<f64>::zeros(count, k);
                 for (j, &[a, c]) in columns.iter().enumerate() {
                     let from = a * s.count + start;
                     let from = match c < b {
                         true => s.w.as_ref().subrows(from, count).col(c),
                         false => ColRef::from_slice(&right[r][from..from + count]),
                     };
-                    let mut to = rows.as_mut().subrows_mut(above, count).col_mut(j);
-                    to.copy_from(from);
+                    rows.as_mut().col_mut(j).copy_from(from);
                 }
-                sum = Some(rows.qr().thin_R().to_owned());
+                let both: Vec<Mat<f64>> = sum.into_iter().chain([rows]).collect();
+                sum = Some(linear::factor(&both));
             }
         }
         out.push(sum.unwrap_or_else(|| Mat::zeros(k, k)));

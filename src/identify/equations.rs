@@ -119,7 +119,7 @@ impl<'a> Equations<'a> {
         self.fit_of(fitted.map(Cow::Borrowed).collect())
     }
 
-    /// The same with equations that were taken out.
+    /// The same with their equations, in the order of the records, which were taken out of `stacks`.
     ///
     /// # Errors
     /// As [`Equations::fit`].
@@ -195,10 +195,10 @@ impl Fit<'_> {
     pub fn set_aside(&mut self, pi: &[f64], warnings: &mut Vec<Warning>) -> Result<bool> {
         let (freed, notes) = aside::apart(self.plant, &self.stacks(), &self.prepared, pi)?;
         warnings.extend(notes);
-        let new = freed.is_some();
-        if let Some(stacks) = freed {
-            self.stacks = stacks.into_iter().map(Cow::Owned).collect();
-        }
-        Ok(new)
+        let Some(stacks) = freed else {
+            return Ok(false);
+        };
+        self.stacks = stacks.into_iter().map(Cow::Owned).collect();
+        Ok(true)
     }
 }

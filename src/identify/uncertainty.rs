@@ -100,8 +100,7 @@ pub(super) fn covariance_within(
     let parts: Vec<Mat<f64>> = jobs
         .par_iter()
         .map(|&(i, a)| {
-            let (m, plan) = &plans[i];
-            let m = *m;
+            let (m, ref plan) = plans[i];
             // of one actuator at a time: all of them would be as large as the equations
             let block = weighted_row(stacks[i], &right[i], i, weights, a);
             let column = |c: usize| -> Vec<f64> { (0..m).map(|k| block[(k, c)]).collect() };

@@ -192,7 +192,7 @@ fn together<'a, const W: usize>(
     mut all: impl Iterator<Item = &'a mut [f64]>,
     back: bool,
 ) {
-    let sections = std::array::from_fn(|l| filters[if l < filters.len() { l } else { 0 }]);
+    let sections = std::array::from_fn(|l| *filters.get(l).unwrap_or(&filters[0]));
     let x: [&mut [f64]; W] = std::array::from_fn(|_| all.next().unwrap_or_default());
     match isa {
         Isa::Scalar | Isa::Portable => side_by_side(sections, x, back),
@@ -247,9 +247,9 @@ fn zero_phase_of(filters: &[(Butterworth, usize)], x: &[Vec<f64>], out: &mut [f6
     // as many as one instruction takes: some stand for nothing
     let spare = pairs.len().next_power_of_two() - pairs.len();
     let mut more: Vec<Vec<f64>> = y.iter().take(1).cycle().take(spare).cloned().collect();
+    let isa = Isa::detect();
     for back in [false, true] {
         let y = y.iter_mut().chain(&mut more).map(Vec::as_mut_slice);
-        let isa = Isa::detect();
         match pairs.len() {
             5.. => together::<8>(isa, &pairs, y, back),
             3 | 4 => together::<4>(isa, &pairs, y, back),
