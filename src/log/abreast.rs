@@ -8,20 +8,21 @@ use super::number;
 /// Rows that there is room for at first.
 const FEW: usize = 64;
 
-/// Reads rows of plain numbers from the beginning of two texts, a number a column, into columns that are empty, up to the first
-/// line of either that is something else. Returns where it stopped in each, and the number of rows.
+/// Reads rows of plain numbers from the beginning of two texts, a number a column that is kept, into columns that are empty, up
+/// to the first line of either that is something else. Returns where it stopped in each, and the number of rows.
 pub(super) fn rows(
     texts: [&[u8]; 2],
     delimiter: u8,
+    keep: &[bool],
     columns: [&mut [Vec<f64>]; 2],
 ) -> ([usize; 2], usize) {
     #[cfg(all(target_arch = "x86_64", feature = "wide"))]
     if wide::there_is() {
         // SAFETY: the machine has what it asks for
-        return unsafe { wide::rows(texts, delimiter, columns) };
+        return unsafe { wide::rows(texts, delimiter, keep, columns) };
     }
     // SAFETY: it asks for nothing
-    unsafe { rows_by::<Narrow>(texts, delimiter, columns) }
+    unsafe { rows_by::<Narrow>(texts, delimiter, keep, columns) }
 }
 
 /// A way to read a number of each of two texts.
@@ -37,6 +38,12 @@ trait Numbers {
         delimiter: u8,
         brief: &mut [bool; 2],
     ) -> Option<[(f64, usize); 2]>;
+
+    /// Where the cell ends that stands at this place.
+    ///
+    /// # Safety
+    /// As [`Numbers::two`].
+    unsafe fn end(text: &[u8], at: usize, delimiter: u8) -> Option<usize>;
 }
 
 /// With what every machine has.
@@ -54,6 +61,13 @@ impl Numbers for Narrow {
         let b = number::plain(texts[1], at[1], delimiter, &mut brief[1]);
         Some([a?, b?])
     }
+
+    #[inline(always)]
+    unsafe fn end(text: &[u8], at: usize, delimiter: u8) -> Option<usize> {
+        let mut rest = text[at..].iter();
+        rest.position(|c| *c == delimiter || *c == b'\n')
+            .map(|size| at + size)
+    }
 }
 
 /// [`rows`] in one of the ways.
@@ -64,33 +78,70 @@ impl Numbers for Narrow {
 unsafe fn rows_by<N: Numbers>(
     texts: [&[u8]; 2],
     delimiter: u8,
+    keep: &[bool],
     [x, y]: [&mut [Vec<f64>]; 2],
 ) -> ([usize; 2], usize) {
-    let n = x.len();
+    let n = keep.len();
     let mut brief = vec![[true; 2]; n];
     let (mut at, mut done) = ([0; 2], 0);
-    let mut room = x.iter().map(Vec::capacity).min().unwrap_or(0).max(FEW);
-    if n == 0 {
+    let kept = |columns: &[Vec<f64>]| {
+        let kept = columns.iter().zip(keep).filter(|(_, keep)| **keep);
+        kept.map(|(c, _)| c.capacity()).min()
+    };
+    let Some(room) = kept(x) else {
         return (at, done);
-    }
+    };
+    let mut room = room.max(FEW);
     'rows: loop {
-        (x.iter_mut().chain(&mut *y)).for_each(|column| column.resize(room, 0.0));
-        let mut to: Vec<[&mut [f64]; 2]> = (x.iter_mut().zip(&mut *y))
-            .map(|(x, y)| [x.as_mut_slice(), y.as_mut_slice()])
+        let columns = (x.iter_mut().zip(&mut *y)).zip(keep);
+        let mut to: Vec<Option<[&mut [f64]; 2]>> = columns
+            .map(|((x, y), keep)| {
+                keep.then(|| {
+                    [x, y].map(|column| {
+                        column.resize(room, 0.0);
+                        column.as_mut_slice()
+                    })
+                })
+            })
             .collect();
         while done < room {
             let mut next = at;
+            // numbers tell a row; a line that does not begin with one may be a remark
+            let remark =
+                |k: usize| matches!(texts[k].get(next[k]), None | Some(b'#' | b'%' | b'/'));
+            if !keep[0] && (remark(0) || remark(1)) {
+                break 'rows;
+            }
             for (k, (to, brief)) in to.iter_mut().zip(&mut brief).enumerate() {
-                // SAFETY: by the caller's promise
-                let found = unsafe { N::two(texts, next, delimiter, brief) };
-                let Some([(u, a), (v, b)]) = found else {
-                    break 'rows;
-                };
+                let (a, b);
+                match to {
+                    Some([x, y]) => {
+                        // SAFETY: by the caller's promise
+                        let found = unsafe { N::two(texts, next, delimiter, brief) };
+                        let Some([(u, end), (v, other)]) = found else {
+                            break 'rows;
+                        };
+                        (x[done], y[done]) = (u, v);
+                        (a, b) = (end, other);
+                    }
+                    None => {
+                        // SAFETY: by the caller's promise
+                        let ends = unsafe {
+                            (
+                                N::end(texts[0], next[0], delimiter),
+                                N::end(texts[1], next[1], delimiter),
+                            )
+                        };
+                        let (Some(end), Some(other)) = ends else {
+                            break 'rows;
+                        };
+                        (a, b) = (end, other);
+                    }
+                }
                 let last = k + 1 == n;
                 if (texts[0][a] == b'\n') != last || (texts[1][b] == b'\n') != last {
                     break 'rows;
                 }
-                (to[0][done], to[1][done]) = (u, v);
                 next = [a + 1, b + 1];
             }
             at = next;
@@ -153,10 +204,11 @@ mod wide {
     pub unsafe fn rows(
         texts: [&[u8]; 2],
         delimiter: u8,
+        keep: &[bool],
         columns: [&mut [Vec<f64>]; 2],
     ) -> ([usize; 2], usize) {
         // SAFETY: by the caller's promise
-        unsafe { rows_by::<Wide>(texts, delimiter, columns) }
+        unsafe { rows_by::<Wide>(texts, delimiter, keep, columns) }
     }
 
     /// With AVX2.
@@ -185,8 +237,58 @@ mod wide {
                 // a column of other numbers, but for the beginning of a text
                 brief[0] = at[0].min(at[1]) < CELL;
             }
+            if brief[1] {
+                // SAFETY: by the caller's promise
+                let cells = unsafe {
+                    [
+                        Long::at(texts[0], at[0], delimiter),
+                        Long::at(texts[1], at[1], delimiter),
+                    ]
+                };
+                let found = match &cells {
+                    // SAFETY: by the caller's promise
+                    [Some(a), Some(b)] => unsafe { long_numbers(a, b) },
+                    _ => None,
+                };
+                if found.is_some() {
+                    return found;
+                }
+                brief[1] = at[0].min(at[1]) < CELL;
+            }
             // SAFETY: it asks for nothing
             unsafe { Narrow::two(texts, at, delimiter, &mut [false; 2]) }
+        }
+
+        #[inline(always)]
+        unsafe fn end(text: &[u8], at: usize, delimiter: u8) -> Option<usize> {
+            let mut from = at;
+            while from + AHEAD <= text.len() {
+                // SAFETY: 32 bytes are there
+                let ends = unsafe { ends(text, from, delimiter) };
+                if ends != 0 {
+                    return Some(from + ends.trailing_zeros() as usize);
+                }
+                from += AHEAD;
+            }
+            // SAFETY: it asks for nothing
+            unsafe { Narrow::end(text, from, delimiter) }
+        }
+    }
+
+    /// Which of 32 bytes end a cell.
+    ///
+    /// # Safety
+    /// They must be there, and the machine must have AVX2.
+    #[inline(always)]
+    unsafe fn ends(text: &[u8], from: usize, delimiter: u8) -> u32 {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let ahead = _mm256_loadu_si256(text.as_ptr().add(from).cast());
+            let ends = _mm256_or_si256(
+                _mm256_cmpeq_epi8(ahead, _mm256_set1_epi8(delimiter as i8)),
+                _mm256_cmpeq_epi8(ahead, _mm256_set1_epi8(b'\n' as i8)),
+            );
+            _mm256_movemask_epi8(ends) as u32
         }
     }
 
@@ -202,25 +304,20 @@ mod wide {
 
     impl Cell {
         /// The one that starts at a place, if it is digits with one point and there are no more than fifteen; none at the very
-        /// beginning and the end of a text, where sixteen bytes before its end and 32 from its beginning are not all there.
+        /// beginning and the end of a text, where sixteen bytes before its end and 33 from its beginning are not all there.
         ///
         /// # Safety
         /// The machine must have AVX2.
         #[inline(always)]
         unsafe fn at(text: &[u8], at: usize, delimiter: u8) -> Option<Cell> {
-            if at < CELL || at + AHEAD > text.len() {
+            if at < CELL || at + AHEAD >= text.len() {
                 return None;
             }
-            // SAFETY: 32 bytes are there
-            let ahead = unsafe { _mm256_loadu_si256(text.as_ptr().add(at).cast()) };
+            // a blank behind the delimiter
+            let at = at + usize::from(text[at] == b' ');
             let negative = text[at] == b'-';
-            // SAFETY: by the caller's promise
-            let ends = unsafe {
-                _mm256_movemask_epi8(_mm256_or_si256(
-                    _mm256_cmpeq_epi8(ahead, _mm256_set1_epi8(delimiter as i8)),
-                    _mm256_cmpeq_epi8(ahead, _mm256_set1_epi8(b'\n' as i8)),
-                ))
-            };
+            // SAFETY: 32 bytes are there
+            let ends = unsafe { ends(text, at, delimiter) };
             let size = ends.trailing_zeros() as usize;
             let length = size.wrapping_sub(usize::from(negative));
             // a digit and a point at least
@@ -239,13 +336,7 @@ mod wide {
                 )
             };
             // SAFETY: by the caller's promise
-            let [others, points] = unsafe {
-                [
-                    _mm_cmpeq_epi8(_mm_max_epu8(digits, _mm_set1_epi8(10)), digits),
-                    _mm_cmpeq_epi8(digits, _mm_set1_epi8((b'.' ^ b'0') as i8)),
-                ]
-                .map(|m| _mm_movemask_epi8(m) as u32)
-            };
+            let [others, points] = unsafe { strangers(digits) };
             if others != points || !others.is_power_of_two() {
                 return None;
             }
@@ -262,6 +353,137 @@ mod wide {
         }
     }
 
+    /// A cell of more digits, or with an exponent.
+    struct Long {
+        /// its last digits, in the last bytes of sixteen
+        digits: __m128i,
+        /// what the digits before them add
+        more: u64,
+        /// power of ten of the last digit
+        power: i32,
+        negative: bool,
+        end: usize,
+    }
+
+    impl Long {
+        /// The one that starts at a place, if it is up to nineteen digits, with one point among them or none, and perhaps
+        /// `e±dd`; none where [`Cell::at`] has none.
+        ///
+        /// # Safety
+        /// The machine must have AVX2.
+        #[inline(always)]
+        unsafe fn at(text: &[u8], at: usize, delimiter: u8) -> Option<Long> {
+            if at < CELL || at + AHEAD >= text.len() {
+                return None;
+            }
+            let at = at + usize::from(text[at] == b' ');
+            let negative = text[at] == b'-';
+            let first = at + usize::from(negative);
+            // SAFETY: 32 bytes are there
+            let size = unsafe { ends(text, at, delimiter) }.trailing_zeros() as usize;
+            if size == AHEAD {
+                return None;
+            }
+            let end = at + size;
+            let mut stop = end - usize::from(text[end - 1] == b'\r' && text[end] == b'\n');
+            let mut power = 0;
+            if let [e, sign, tens, ones] = text[stop - 4..stop]
+                && e | 0x20 == b'e'
+            {
+                let [tens, ones] = [tens, ones].map(|c| i32::from(c.wrapping_sub(b'0')));
+                if tens > 9 || ones > 9 || !matches!(sign, b'-' | b'+') {
+                    return None;
+                }
+                power = if sign == b'-' { -1 } else { 1 } * (10 * tens + ones);
+                stop -= 4;
+            }
+            let length = stop.checked_sub(first)?;
+            // SAFETY: sixteen bytes are there before any cell, and of the mask there are as many from sixteen or less on
+            let low = unsafe {
+                _mm_and_si128(
+                    _mm_xor_si128(
+                        _mm_loadu_si128(text.as_ptr().add(stop - CELL).cast()),
+                        _mm_set1_epi8(b'0' as i8),
+                    ),
+                    _mm_loadu_si128(LAST.as_ptr().add(length.min(CELL)).cast()),
+                )
+            };
+            // SAFETY: by the caller's promise
+            let [others, points] = unsafe { strangers(low) };
+            let (mut before, mut behind) = (0, None);
+            for c in &text[first..first.max(stop - CELL)] {
+                match c {
+                    b'0'..=b'9' => before = 10 * before + u64::from(c - b'0'),
+                    b'.' if behind.is_none() => behind = Some(0),
+                    _ => return None,
+                }
+                behind = behind.map(|n| n + i32::from(*c != b'.'));
+            }
+            if others == 0 {
+                // no point, or one further in front
+                let digits = length - usize::from(behind.is_some());
+                power -= behind.map_or(0, |n| n + CELL as i32);
+                let sound = digits > 0 && before < 1000;
+                return sound.then(|| Long {
+                    digits: low,
+                    more: before * 10_000_000_000_000_000,
+                    power,
+                    negative,
+                    end,
+                });
+            }
+            if others != points || !others.is_power_of_two() || behind.is_some() || length < 2 {
+                return None;
+            }
+            let point = CELL - 1 - others.trailing_zeros() as usize;
+            // SAFETY: by the caller's promise
+            let digits =
+                unsafe { _mm_shuffle_epi8(low, _mm_loadu_si128(JOINED[point].as_ptr().cast())) };
+            (before < 10_000).then(|| Long {
+                digits,
+                more: before * 1_000_000_000_000_000,
+                power: power - point as i32,
+                negative,
+                end,
+            })
+        }
+    }
+
+    /// Which of sixteen digits are none, and which of them are points.
+    ///
+    /// # Safety
+    /// The machine must have AVX2.
+    #[inline(always)]
+    unsafe fn strangers(digits: __m128i) -> [u32; 2] {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let others = _mm_cmpeq_epi8(_mm_max_epu8(digits, _mm_set1_epi8(10)), digits);
+            let points = _mm_cmpeq_epi8(digits, _mm_set1_epi8((b'.' ^ b'0') as i8));
+            [
+                _mm_movemask_epi8(others) as u32,
+                _mm_movemask_epi8(points) as u32,
+            ]
+        }
+    }
+
+    /// The numbers that twice sixteen digits make.
+    ///
+    /// # Safety
+    /// The machine must have AVX2.
+    #[inline(always)]
+    unsafe fn wholes(a: __m128i, b: __m128i) -> [u64; 2] {
+        // SAFETY: by the caller's promise
+        unsafe {
+            let pairs = _mm256_maddubs_epi16(_mm256_set_m128i(b, a), _mm256_set1_epi16(0x010A));
+            let fours = _mm256_madd_epi16(pairs, _mm256_set1_epi32(0x0001_0064));
+            let fours = _mm256_packus_epi32(fours, fours);
+            let eights = _mm256_madd_epi16(fours, _mm256_set1_epi32(0x0001_2710));
+            let high = _mm256_mul_epu32(eights, _mm256_set1_epi64x(100_000_000));
+            let all = _mm256_add_epi64(high, _mm256_srli_epi64(eights, 32));
+            [_mm256_extract_epi64(all, 0), _mm256_extract_epi64(all, 2)].map(|x| x as u64)
+        }
+    }
+
     /// The numbers of two cells, and where these end.
     ///
     /// # Safety
@@ -269,23 +491,30 @@ mod wide {
     #[inline(always)]
     unsafe fn numbers(a: &Cell, b: &Cell) -> [(f64, usize); 2] {
         // SAFETY: by the caller's promise
-        let whole = unsafe {
-            let pairs = _mm256_maddubs_epi16(
-                _mm256_set_m128i(b.digits, a.digits),
-                _mm256_set1_epi16(0x010A),
-            );
-            let fours = _mm256_madd_epi16(pairs, _mm256_set1_epi32(0x0001_0064));
-            let fours = _mm256_packus_epi32(fours, fours);
-            let eights = _mm256_madd_epi16(fours, _mm256_set1_epi32(0x0001_2710));
-            let high = _mm256_mul_epu32(eights, _mm256_set1_epi64x(100_000_000));
-            let all = _mm256_add_epi64(high, _mm256_srli_epi64(eights, 32));
-            [_mm256_extract_epi64(all, 0), _mm256_extract_epi64(all, 2)]
-        };
+        let whole = unsafe { wholes(a.digits, b.digits) };
         [(a, whole[0]), (b, whole[1])].map(|(cell, whole)| {
-            let x = number::quotient_of_few(whole as u64, cell.point);
+            let x = number::quotient_of_few(whole, cell.point);
             let sign = u64::from(cell.negative) << 63;
             (f64::from_bits(x.to_bits() | sign), cell.end)
         })
+    }
+
+    /// The same of long ones; `None` where they are not told.
+    ///
+    /// # Safety
+    /// The machine must have AVX2.
+    #[inline(always)]
+    unsafe fn long_numbers(a: &Long, b: &Long) -> Option<[(f64, usize); 2]> {
+        // SAFETY: by the caller's promise
+        let whole = unsafe { wholes(a.digits, b.digits) };
+        let (x, y) = (
+            number::nearest(a.more + whole[0], a.power)?,
+            number::nearest(b.more + whole[1], b.power)?,
+        );
+        Some([
+            (if a.negative { -x } else { x }, a.end),
+            (if b.negative { -y } else { y }, b.end),
+        ])
     }
 }
 
@@ -295,38 +524,46 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// A text of so many rows of five cells, of kinds that are mostly plain, and what each is.
-    fn text(rng: &mut ChaCha8Rng, lines: usize) -> (String, Vec<Vec<f64>>) {
+    /// A text of so many rows of six cells, of kinds that are mostly plain, and what each is; the fifth is anything.
+    fn text(rng: &mut ChaCha8Rng, lines: usize, end: &str) -> (String, Vec<Vec<f64>>) {
         let (mut out, mut all) = (String::new(), Vec::new());
         for _ in 0..lines {
-            let cells: Vec<String> = (0..5)
+            let cells: Vec<String> = (0..6)
                 .map(|k| {
                     let x = rng.random_range(-1.0..1.0) * 10f64.powi(rng.random_range(-4..8));
                     match (k, rng.random_range(0..40)) {
                         (0, _) => format!("{:.3}", x.abs()),
+                        (4, n) => {
+                            ["", "#", "1.5", "AUTO", "2026-01-05 08:00:30"][n % 5].repeat(n / 8)
+                        }
                         (_, 0) => format!("{}", x as f32),
                         (_, 1) => format!("{}", x as i64),
                         (_, 2) => format!("{x:.0}."),
                         (_, 3) => format!("{x:.10}"),
+                        (_, 4) => format!(" {x:.3}"),
+                        (_, 5) => format!("   {x:e}"),
+                        (_, 6) => format!("{x:.18E}"),
+                        (2, _) => x.to_string(),
                         (3, _) => format!("{:.6}", x).replacen("0.", ".", 1),
                         _ => format!("{x:.6}"),
                     }
                 })
                 .collect();
-            all.push(cells.iter().map(|c| c.parse().unwrap()).collect());
+            let number = |c: &String| c.trim().parse().unwrap_or(f64::NAN);
+            all.push(cells.iter().map(number).collect());
             out += &cells.join(",");
-            out += "\n";
+            out += end;
         }
         (out, all)
     }
 
-    type Way = fn([&[u8]; 2], u8, [&mut [Vec<f64>]; 2]) -> ([usize; 2], usize);
+    type Way = fn([&[u8]; 2], &[bool], [&mut [Vec<f64>]; 2]) -> ([usize; 2], usize);
 
     fn ways() -> [Way; 2] {
         // SAFETY: the narrow way asks for nothing, and the other one is chosen where it can be
         [
-            |t, d, c| unsafe { rows_by::<Narrow>(t, d, c) },
-            |t, d, c| rows(t, d, c),
+            |t, k, c| unsafe { rows_by::<Narrow>(t, b',', k, c) },
+            |t, k, c| rows(t, b',', k, c),
         ]
     }
 
@@ -335,19 +572,22 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         for case in 0..200 {
             let lines = [1, 3, 70, 500][case % 4];
-            let (a, all) = text(&mut rng, lines);
-            let (b, others) = text(&mut rng, lines);
+            let end = ["\n", "\r\n"][case / 4 % 2];
+            let (a, all) = text(&mut rng, lines, end);
+            let (b, others) = text(&mut rng, lines, end);
+            let mut keep = [true, true, true, true, false, true];
+            keep[5 * (case / 8 % 2)] = case % 3 > 0;
             for way in ways() {
-                let [mut x, mut y] = [(); 2].map(|()| vec![Vec::new(); 5]);
+                let [mut x, mut y] = [(); 2].map(|()| vec![Vec::new(); 6]);
                 let texts = [a.as_bytes(), b.as_bytes()];
-                let (at, rows) = way(texts, b',', [&mut x, &mut y]);
+                let (at, rows) = way(texts, &keep, [&mut x, &mut y]);
                 assert_eq!((rows, at), (lines, [a.len(), b.len()]), "{case}");
                 for (columns, all) in [(&x, &all), (&y, &others)] {
-                    for (r, row) in all.iter().enumerate() {
-                        let bits = |v: f64| v.to_bits();
-                        let ours: Vec<u64> = columns.iter().map(|c| bits(c[r])).collect();
-                        let theirs: Vec<u64> = row.iter().map(|v| bits(*v)).collect();
-                        assert_eq!(ours, theirs, "{case}, row {r}");
+                    for (k, column) in columns.iter().enumerate() {
+                        let theirs = all.iter().filter(|_| keep[k]).map(|row| row[k]);
+                        let theirs: Vec<u64> = theirs.map(f64::to_bits).collect();
+                        let ours: Vec<u64> = column.iter().map(|v| v.to_bits()).collect();
+                        assert_eq!(ours, theirs, "{case}, column {k}");
                     }
                 }
             }
@@ -367,9 +607,12 @@ mod tests {
             "1.5,.,3.125\n",
             "1.5,-.,3.125\n",
             "1.5,+2.25,3.125\n",
-            "1.5,2.25e3,3.125\n",
-            "1.5,2.25,3.125\r\n",
-            "1.5, 2.25,3.125\n",
+            "1.5,2.25e,3.125\n",
+            "1.5,2.25e-123456,3.125\n",
+            "1.5,2.25 ,3.125\n",
+            "1.5,2.25,3.125\r,\n",
+            "1.5,2.25\r,3.125\n",
+            "1.5,  ,3.125\n",
             "1.5,12345678901234567890.5,3.125\n",
             "# 1.5,2.25,3.125\n",
             "\n",
@@ -380,13 +623,25 @@ mod tests {
                 for texts in [[&text, &good], [&good, &text]] {
                     let [mut x, mut y] = [(); 2].map(|()| vec![Vec::new(); 3]);
                     let bytes = texts.map(|t| t.as_bytes());
-                    let (at, rows) = way(bytes, b',', [&mut x, &mut y]);
+                    let (at, rows) = way(bytes, &[true; 3], [&mut x, &mut y]);
                     assert_eq!((rows, at), (18, [2 * plain.len(); 2]), "{bad:?} {k}");
                     assert!(x.iter().chain(&y).all(|c| c.len() == 18), "{bad:?} {k}");
                 }
             }
         }
         let [mut x, mut y] = [(); 2].map(|()| Vec::new());
-        assert_eq!(rows([b"1.5\n"; 2], b',', [&mut x, &mut y]), ([0; 2], 0));
+        let [x, y] = [&mut x, &mut y];
+        assert_eq!(rows([b"1.5\n"; 2], b',', &[], [x, y]), ([0; 2], 0));
+    }
+
+    /// A remark is no row, also where its line has as many cells and the first one is passed over.
+    #[test]
+    fn remarks_stop_both() {
+        let text = "AUTO,1.5\n".repeat(4) + "# pause,2.5\n" + &"AUTO,1.5\n".repeat(9);
+        for way in ways() {
+            let [mut x, mut y] = [(); 2].map(|()| vec![Vec::new(); 2]);
+            let found = way([text.as_bytes(); 2], &[false, true], [&mut x, &mut y]);
+            assert_eq!(found, ([36; 2], 4));
+        }
     }
 }

@@ -490,9 +490,9 @@ fn piece(text: &[u8], delimiter: u8, cells: &[Cell], keep: &[bool]) -> [Piece; 2
     let end = text[middle..].iter().position(|b| *b == b'\n');
     let (a, b) = text.split_at(end.map_or(text.len(), |at| middle + at + 1));
     let [mut x, mut y] = [a, b].map(|text| empty(text, keep));
-    let usual = |k: usize| keep[k] && cells[k] == Cell::Number;
+    let usual = |k: usize| !keep[k] || cells[k] == Cell::Number;
     let ([p, q], rows) = match (0..keep.len()).all(usual) {
-        true => abreast::rows([a, b], delimiter, [&mut x.columns, &mut y.columns]),
+        true => abreast::rows([a, b], delimiter, keep, [&mut x.columns, &mut y.columns]),
         false => ([0, 0], 0),
     };
     (x.lines, y.lines) = (rows, rows);

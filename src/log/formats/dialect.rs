@@ -77,6 +77,11 @@ pub(super) fn canonical(text: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u
         } else {
             body
         };
+        if !body.iter().fold(false, |any, c| any | special(c)) {
+            simple(body, delimiter, comma, out);
+            out.extend(end);
+            continue;
+        }
         let (mut depth, mut quoted) = (0u32, None);
         // whether a separator is due before the next character
         let mut due = false;
@@ -130,6 +135,35 @@ pub(super) fn canonical(text: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u
         }
         out.extend(end);
     }
+}
+
+/// Whether a byte may begin or end more than itself.
+fn special(c: &u8) -> bool {
+    matches!(c, b'"' | b'\'' | b'[' | b'(')
+}
+
+/// [`canonical`] of a line without quotes and brackets, and without blanks at its ends.
+fn simple(line: &[u8], delimiter: u8, comma: bool, out: &mut Vec<u8>) {
+    let instead = if comma { b'.' } else { b' ' };
+    let of = |c: u8| if c == b',' { instead } else { c };
+    let parts = |c: u8| c == delimiter || delimiter == b' ' && c == b'\t';
+    let pairs = line.iter().zip(line.iter().skip(1));
+    let runs = delimiter == b' ' && pairs.fold(false, |any, (a, b)| any | (parts(*a) & parts(*b)));
+    if !runs {
+        out.extend(line.iter().map(|&c| if parts(c) { b',' } else { of(c) }));
+        return;
+    }
+    let start = out.len();
+    out.resize(start + line.len(), 0);
+    let (mut at, mut before) = (start, false);
+    for &c in line {
+        // the next one overwrites what is not counted
+        at -= usize::from(parts(c) & before);
+        out[at] = if parts(c) { b',' } else { of(c) };
+        at += 1;
+        before = parts(c);
+    }
+    out.truncate(at);
 }
 
 /// Takes away the name of a type that Python writes before a value, as in `np.float64(0.5)` and `array([0.5])`; whether there
@@ -353,10 +387,9 @@ impl Dialect {
             *last = Cell::Text;
         }
         let turns = turns.map(|(k, turn)| (names.get(k).cloned().unwrap_or_default(), turn));
-        let special = |l: &&[u8]| l.iter().any(|b| matches!(b, b'"' | b'\'' | b'[' | b'('));
         let plain = !comma
             && delimiter != b' '
-            && !lines.iter().skip(first).any(|l| !idle(l) && special(l));
+            && !(lines.iter().skip(first)).any(|l| !idle(l) && l.iter().any(special));
         Some((
             score,
             Dialect {
@@ -638,6 +671,39 @@ pub(super) fn strip(text: &[u8]) -> &[u8] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a line without quotes and brackets becomes is what the way for all lines makes of it.
+    #[test]
+    fn lines_without_quotes_are_canonical_alike() {
+        let of = |text: &str, delimiter: u8, comma: bool| {
+            let mut out = Vec::new();
+            canonical(text.as_bytes(), delimiter, comma, &mut out);
+            String::from_utf8(out).unwrap()
+        };
+        for (text, delimiter, comma, expected) in [
+            ("1,5;2;-3,25 \r\n;;\n", b';', true, "1.5;2;-3.25\n;;\n"),
+            ("1.5\t 2\t3,4\t\n", b'\t', false, "1.5; 2;3 4;\n"),
+            ("1.5 2 -3\n", b' ', false, "1.5;2;-3\n"),
+            (
+                "  1.5   2 \t -3  \n\t4\t\t5 6\n",
+                b' ',
+                false,
+                "1.5;2;-3\n4;5;6\n",
+            ),
+            ("1,5  2\n", b' ', true, "1.5;2\n"),
+            ("a b,c\n", b' ', false, "a;b c\n"),
+            ("1.5, 2\n# 1, 2\n\n3,4", b',', false, "1.5; 2\n\n\n3;4"),
+        ] {
+            let expected = expected.replace(';', ",");
+            assert_eq!(of(text, delimiter, comma), expected, "{text:?}");
+            // a quoted cell at the end makes a line one for the other way
+            let quoted = format!("{}{}\"x\"", text.trim(), char::from(delimiter));
+            let both = format!("{},x", expected.trim_end_matches(['\n', ',']));
+            if !text.trim().contains('\n') {
+                assert_eq!(of(&quoted, delimiter, comma), both);
+            }
+        }
+    }
 
     #[test]
     fn types_that_python_writes_are_taken_away() {
