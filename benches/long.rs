@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo bench --bench long -- log 10        # millions of rows of seven joints: read, and identified in parts
 //! cargo bench --bench long -- digits 10     # the same with all digits of the numbers, in place of six decimals
+//! cargo bench --bench long -- exponents 10  # as `numpy.savetxt` writes them, `-1.234567890123456789e-01`
 //! cargo bench --bench long -- diagnose 5    # records of 20 s at 1 kHz of a clean Panda
 //! ```
 //!
@@ -37,10 +38,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         true => diagnosis(number.unwrap_or(5), whole),
         false => {
             let rows = number.unwrap_or(1) * if whole { 1_000_000 } else { 4000 };
-            log(rows, words.iter().any(|a| a == "digits"))
+            let asked = |form: &&Form| words.iter().any(|a| a == form.0);
+            log(rows, FORMS.iter().find(asked).unwrap_or(&FORMS[0]))
         }
     }
 }
+
+/// A way to write a number, and its name.
+struct Form(&'static str, fn(f64) -> String);
+
+const FORMS: [Form; 3] = [
+    Form("decimals", |x| format!("{x:.6}")),
+    Form("digits", |x| format!("{x}")),
+    Form("exponents", |x| {
+        let text = format!("{x:.18e}");
+        // two digits and a sign, as C writes an exponent
+        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        format!("{digits}e{:+03}", exponent.parse::<i32>().unwrap_or(0))
+    }),
+];
 
 /// A motion of the Panda that visits a good part of its joints' ranges.
 fn motion() -> Fourier {
@@ -91,11 +107,11 @@ fn said(what: &str, since: Instant, megabytes: f64) {
     println!("{what}: {seconds:.1} s{rate}{most}");
 }
 
-fn log(rows: usize, digits: bool) -> Result<(), Box<dyn std::error::Error>> {
+fn log(rows: usize, form: &Form) -> Result<(), Box<dyn std::error::Error>> {
     let terms = [JointTerm::Viscous, JointTerm::Coulomb, JointTerm::Offset];
     let plant = Plant::load("panda")?.with_terms(&terms);
     let path = std::env::temp_dir().join(format!("excite_long_{}.csv", std::process::id()));
-    let done = generate(&plant, &path, rows, digits).and_then(|()| long(&plant, &path, rows));
+    let done = generate(&plant, &path, rows, form).and_then(|()| long(&plant, &path, rows));
     std::fs::remove_file(&path)?;
     done
 }
@@ -105,17 +121,14 @@ fn generate(
     plant: &Plant,
     path: &Path,
     rows: usize,
-    digits: bool,
+    form: &Form,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let record = run(plant, if rows > 50_000 { 10 } else { 1 }, 1, Purpose::Fit)?;
     let lines: Vec<String> = (0..record.len())
         .map(|i| {
             let mut line = String::new();
             for column in record.q.iter().chain(&record.tau) {
-                let _ = match digits {
-                    true => write!(line, ",{}", column[i]),
-                    false => write!(line, ",{:.6}", column[i]),
-                };
+                let _ = write!(line, ",{}", form.1(column[i]));
             }
             line
         })
