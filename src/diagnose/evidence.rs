@@ -142,6 +142,12 @@ impl Set<'_> {
         }
         solve(&s, &[&self.b[..], &more.b].concat())
     }
+
+    /// Parameters of the nominal model that go with it.
+    pub fn parameters(&self, more: &Projected, fit: &Fit) -> Vec<f64> {
+        let all: Vec<&Projected> = self.members.iter().copied().chain([more]).collect();
+        self.evidence.parameters(&all, fit)
+    }
 }
 
 /// The whitened columns of the nominal model on the rows of one actuator in units of the prior, `W = B R`: `B` are those that

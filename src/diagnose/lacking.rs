@@ -17,7 +17,7 @@ use super::catalogue::{Context, Effect, Place, Shape, Value};
 use super::chain;
 use super::channel::Assumed;
 use super::data::Data;
-use super::evidence::{Evidence, Projected};
+use super::evidence::{Evidence, Fit, Projected};
 use super::finding::{self, Finding, estimate};
 use super::improve::Improved;
 use super::payload::Loads;
@@ -53,6 +53,14 @@ struct Own {
 }
 
 impl Own {
+    /// How much of it parameters hold: friction brakes, an offset has either sign.
+    fn size(&self, phi: &[f64]) -> f64 {
+        match self.term {
+            JointTerm::Offset => phi[self.at].abs(),
+            _ => phi[self.at],
+        }
+    }
+
     fn place(&self) -> Place {
         Place::Actuator(self.actuator)
     }
@@ -269,13 +277,7 @@ fn fitted(data: &Data, terms: &[Own]) -> (Vec<f64>, Vec<f64>) {
     let fit = evidence.fit(&[]);
     let phi = evidence.parameters(&[], &fit);
     let scale = inflation(&evidence.residual(&[], &fit), data.fitted);
-    let known = |own: &Own| {
-        let value = match own.term {
-            JointTerm::Offset => phi[own.at].abs(),
-            _ => phi[own.at],
-        };
-        value / (scale * evidence.std(own.at)).max(f64::MIN_POSITIVE)
-    };
+    let known = |own: &Own| own.size(&phi) / (scale * evidence.std(own.at)).max(f64::MIN_POSITIVE);
     let known = terms.iter().map(known).collect();
     (phi, known)
 }
@@ -298,6 +300,10 @@ pub struct Beyond<'a> {
     pub cx: &'a Context<'a>,
     /// the catalogue
     pub effects: &'a [Box<dyn Effect>],
+    /// all that was found
+    pub set: &'a [&'a Projected],
+    /// its fit
+    pub fit: &'a Fit,
     /// whitened residuals of the refit with the friction alone, and with all that was found
     pub left: [&'a [Vec<f64>]; 2],
     /// parameters with all that was found
@@ -421,8 +427,8 @@ impl Beyond<'_> {
             }
         };
         let scale = inflation(self.left[1], data.fitted);
-        let std = |own: &Own| scale * self.evidence.std(own.at);
-        let known = |own: &Own| self.phi[own.at].abs() / std(own).max(f64::MIN_POSITIVE);
+        let std = |own: &Own| scale * self.evidence.std_beside(self.set, self.fit, own.at);
+        let known = |own: &Own| own.size(self.phi) / std(own).max(f64::MIN_POSITIVE);
         let mut shared: Vec<(&Own, Taken)> = Vec::new();
         let mut out: Vec<Finding> = Vec::new();
         for ((own, effect), projected) in all.iter().zip(&projected) {
@@ -435,6 +441,10 @@ impl Beyond<'_> {
             let others: Vec<&Own> = (all.iter().map(|a| a.0))
                 .filter(|other| other.at != own.at && own.shares(other))
                 .collect();
+            // friction that drives is none: what else was found stands for it
+            if own.size(self.phi) <= 0.0 {
+                continue;
+            }
             // that there is friction is known before which of the two it is
             let sure = known(own);
             let first = others.iter().all(|other| known(other) < sure);

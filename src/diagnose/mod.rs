@@ -230,6 +230,8 @@ fn of_plant<'a>(
             evidence: &evidence,
             cx: &cx,
             effects: &effects,
+            set: &members,
+            fit: &fit,
             left: left.each_ref().map(|e| &e[..]),
             phi: &phi_after,
             seed: settings.seed,

@@ -5,6 +5,7 @@ use super::column::Column;
 use super::evidence::{Evidence, Projected, Set};
 use super::thresholds::THRESHOLDS as T;
 use crate::report::format::significant;
+use crate::robot::JointTerm;
 use rayon::prelude::*;
 
 /// An effect at a place with its best shape.
@@ -97,6 +98,42 @@ fn impossible(
     })
 }
 
+/// An effect with a shape and coefficients.
+pub type Member<'a> = (&'a dyn Effect, &'a Shape, &'a [f64]);
+
+/// Whether the friction of a joint brakes at all speeds, with what the effects at this place add to it and what a refit makes of the
+/// rest, which `phi` gives: one that would drive the joint stands for something else.
+pub fn brakes(
+    cx: &Context,
+    place: &Place,
+    effects: &[Member],
+    phi: impl FnOnce() -> Vec<f64>,
+) -> bool {
+    let added = |speed: f64| -> Vec<f64> {
+        let each = effects.iter();
+        each.filter_map(|(effect, shape, eta)| effect.brakes(cx, place, shape, eta, speed))
+            .collect()
+    };
+    let top = cx.data.speed[place.first()];
+    if added(top).is_empty() {
+        return true;
+    }
+    let phi = phi();
+    let [viscous, coulomb] =
+        [JointTerm::Viscous, JointTerm::Coulomb].map(|term| cx.term_of(place, term, &phi));
+    let at = |share: f64| {
+        let speed = share * top;
+        added(speed).iter().sum::<f64>() + viscous * speed + coulomb
+    };
+    let least = T
+        .search
+        .brakes
+        .map(at)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    least >= -T.search.drives * at(1.0).abs()
+}
+
 /// Looks for shapes beside a set.
 #[derive(Clone, Copy)]
 pub struct Finder<'a> {
@@ -147,7 +184,10 @@ impl Finder<'_> {
             let fit = self.beside.with(&projected);
             let eta = fit.eta[fit.eta.len() - columns.len()..].to_vec();
             let gain = fit.gain - self.beside.gain();
-            let able = gain.is_finite() && effect.plausible(cx, place, shape, &eta);
+            let phi = || self.beside.parameters(&projected, &fit);
+            let able = gain.is_finite()
+                && effect.plausible(cx, place, shape, &eta)
+                && brakes(cx, place, &[(effect, shape, &eta)], phi);
             let columns = (!draft).then_some(columns);
             let why = (able.then(|| impossible(cx, effect, place, shape, &eta, columns))).flatten();
             Tried {

@@ -148,6 +148,15 @@ impl<'a> Context<'a> {
         plant.robot().joints[plant.actuated()[place.first()]].terms[term as usize]
     }
 
+    /// The same where `phi` are the parameters.
+    pub fn term_of(&self, place: &Place, term: JointTerm, phi: &[f64]) -> f64 {
+        let joint = self.data.plant.actuated()[place.first()];
+        let kind = plant::Column::Term { joint, term };
+        let mut all = self.data.parameters.iter();
+        let at = all.position(|p| p.kind == kind);
+        at.map_or_else(|| self.stated(place, term), |at| phi[at])
+    }
+
     /// The whole of a term of which an effect adds a part.
     pub fn whole(&self, place: &Place, term: JointTerm, eta: &[f64]) -> f64 {
         self.stated(place, term) + eta[0]

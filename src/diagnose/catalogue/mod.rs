@@ -202,6 +202,18 @@ pub trait Effect: Sync {
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, _eta: &[f64]) -> bool {
         true
     }
+    /// What it adds to the friction of its joint at a steady speed, N m or N; `None` of what is no such friction, or may not have
+    /// to brake by itself.
+    fn brakes(
+        &self,
+        _cx: &Context,
+        _place: &Place,
+        _shape: &Shape,
+        _eta: &[f64],
+        _speed: f64,
+    ) -> Option<f64> {
+        None
+    }
     /// Why no machine has these coefficients, where none has: not tried as long as another shape is left, and
     /// never found.
     fn impossible(

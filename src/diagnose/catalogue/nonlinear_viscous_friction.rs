@@ -53,6 +53,18 @@ impl Effect for NonlinearViscousFriction {
         vec![Column::on(j, cx.data.own(j, |_, v| power(v)))]
     }
 
+    fn brakes(
+        &self,
+        cx: &Context,
+        place: &Place,
+        shape: &Shape,
+        eta: &[f64],
+        speed: f64,
+    ) -> Option<f64> {
+        let top = cx.data.speed[place.first()];
+        Some(eta[0] * (speed / top).powf(shape[0]))
+    }
+
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
         let Estimate {
             place,

@@ -122,6 +122,17 @@ impl Effect for StribeckFriction {
         eta[0] > 0.0 && eta[0] < most && enough
     }
 
+    fn brakes(
+        &self,
+        _cx: &Context,
+        _place: &Place,
+        shape: &Shape,
+        eta: &[f64],
+        speed: f64,
+    ) -> Option<f64> {
+        Some(eta[0] * (-(speed / shape[0]).powf(shape[1])).exp())
+    }
+
     fn values(&self, cx: &Context, e: &Estimate) -> Vec<Value> {
         let Estimate {
             place,

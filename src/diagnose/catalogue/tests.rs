@@ -436,3 +436,91 @@ fn only_torque_that_is_ahead_may_not_explain_a_part() {
         }
     }
 }
+
+/// Deviations of parameters beside an effect are those of all unknowns together.
+#[test]
+fn parameters_are_less_known_beside_an_effect() {
+    let plant = Plant::load("planar2").unwrap();
+    let plant = plant.with_terms(&JointTerm::FRICTION);
+    let x = motion(&plant);
+    let tau = noisy(&measured(&plant, &x));
+    let data = Data::new(&plant, vec![record(&plant, &x, tau)]).unwrap();
+    let cx = Context::new(&data, plant.values()).unwrap();
+    let evidence = Evidence::new(&data, 1.0);
+    let effects = all();
+    let effect = of_name(&effects, "nonlinear_viscous_friction");
+    let columns = effect.columns(&cx, &Place::Actuator(0), &Shape::of(&[0.7]), false);
+    let projected = evidence.project(&columns);
+    let set = [&projected];
+    let fit = evidence.fit(&set);
+    let draws = evidence.draws(&set, &fit, 1.0).unwrap();
+    let at = |k: Option<usize>| {
+        let one = |i: usize| f64::from(Some(i) == k);
+        let all: Vec<f64> = (0..draws.count()).map(one).collect();
+        draws.at(&all).0
+    };
+    let mean = at(None);
+    let each: Vec<Vec<f64>> = (0..draws.count()).map(|k| at(Some(k))).collect();
+    let mut more = 0;
+    for i in 0..mean.len() {
+        let drawn: f64 = each.iter().map(|d| (d[i] - mean[i]).powi(2)).sum();
+        let told = evidence.std_beside(&set, &fit, i);
+        assert!((told / drawn.sqrt() - 1.0).abs() < 1e-6, "{i}: {told}");
+        more += usize::from(told > 1.01 * evidence.std(i));
+    }
+    assert!(more > 0, "nothing is less known");
+}
+
+/// Friction that would drive its joint at some speed is none.
+#[test]
+fn friction_brakes_at_all_speeds() {
+    let plant = Plant::load("planar2").unwrap();
+    let plant = plant.with_terms(&JointTerm::FRICTION);
+    let x = motion(&plant);
+    let tau = noisy(&measured(&plant, &x));
+    let data = Data::new(&plant, vec![record(&plant, &x, tau)]).unwrap();
+    let cx = Context::new(&data, plant.values()).unwrap();
+    let effects = all();
+    let [grows, rises] = ["nonlinear_viscous_friction", "stribeck_friction"];
+    let (place, top) = (Place::Actuator(0), data.speed[0]);
+    let brakes = |of: &[(&str, Shape, f64)], viscous: f64, coulomb: f64| {
+        let mut phi = plant.values();
+        for (p, x) in plant.parameters().iter().zip(&mut phi) {
+            *x = match p.kind {
+                crate::plant::Column::Term { joint: 0, term } => match term {
+                    JointTerm::Viscous => viscous,
+                    JointTerm::Coulomb => coulomb,
+                    _ => *x,
+                },
+                _ => *x,
+            };
+        }
+        let of: Vec<_> = of.iter().map(|(n, s, eta)| (*n, s, [*eta])).collect();
+        let members: Vec<crate::diagnose::search::Member> = of
+            .iter()
+            .map(|(name, shape, eta)| (of_name(&effects, name), *shape, &eta[..]))
+            .collect();
+        crate::diagnose::search::brakes(&cx, &place, &members, || phi)
+    };
+    let power = |a: f64, eta: f64| (grows, Shape::of(&[a]), eta);
+    let rise = |eta: f64| (rises, Shape::of(&[0.1 * top, 2.0]), eta);
+    assert!(brakes(&[power(0.5, 10.0)], 1.0 / top, 2.0));
+    // little below nothing is within what is not known
+    assert!(brakes(&[power(0.5, 10.0)], 0.0, -0.5));
+    assert!(!brakes(&[power(0.5, 10.0)], 1.0 / top, -5.0));
+    // a rise makes up for it at rest, and not behind it
+    assert!(!brakes(&[rise(6.0)], 10.0 / top, -5.0));
+    assert!(brakes(&[rise(6.0)], 10.0 / top, 5.0));
+    assert!(brakes(&[rise(6.0), power(0.35, 20.0)], 0.0, -4.0));
+    assert!(!brakes(&[rise(2.0), power(0.35, 20.0)], 0.0, -6.0));
+    // viscous friction that falls by itself drives nothing where the other grows
+    assert!(brakes(&[power(0.7, 12.0)], -6.0 / top, 1.0));
+    assert!(!brakes(&[power(2.0, -12.0)], 6.0 / top, 1.0));
+    // nothing that has to brake
+    assert!(brakes(&[], -6.0, -6.0));
+}
+
+fn of_name<'a>(effects: &'a [Box<dyn Effect>], name: &str) -> &'a dyn Effect {
+    let found = effects.iter().find(|e| e.card().name == name);
+    found.expect("an effect of the catalogue").as_ref()
+}

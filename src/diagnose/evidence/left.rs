@@ -27,10 +27,29 @@ impl Evidence<'_> {
 
     /// Standard deviation of parameter `i` beside all others, from records and prior, for noise of variance 1.
     pub fn std(&self, i: usize) -> f64 {
+        self.std_beside(&[], &Fit::default(), i)
+    }
+
+    /// The same beside a set, whose coefficients take a part of it:
+    ///
+    /// ```text
+    /// var φ_i = |x|² + gᵀ Σ_η g        x = L⁻¹ e_i p_i,  g = Cᵀ x
+    /// ```
+    pub fn std_beside(&self, set: &[&Projected], fit: &Fit, i: usize) -> f64 {
         let mut x = Mat::<f64>::zeros(self.d.len(), 1);
         x[(i, 0)] = self.spread[i];
         forwards(&self.l, &mut x);
-        x.col(0).norm_l2()
+        let x = x.col(0);
+        let moved = |one: &&Projected| -> Vec<f64> {
+            let columns = one.c.col_iter();
+            columns.map(|c| c.transpose() * x).collect()
+        };
+        let g: Vec<f64> = set.iter().flat_map(moved).collect();
+        let rows = fit.covariance.iter().zip(&g);
+        let more: f64 = rows
+            .map(|(row, own)| own * row.iter().zip(&g).map(|(c, g)| c * g).sum::<f64>())
+            .sum();
+        (x.squared_norm_l2() + more).sqrt()
     }
 
     /// Squares of a whitened residual on fitted rows, by actuator.

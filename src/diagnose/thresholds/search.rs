@@ -30,6 +30,11 @@ pub struct Search {
     pub words: usize,
     /// Rounds of exchange. Unit: count. Source: by hand.
     pub rounds: usize,
+    /// Speeds at which the friction of a joint must brake, over its largest. Unit: share. Source: by hand.
+    pub brakes: [f64; 4],
+    /// How much it may drive there, over what it brakes with at the largest speed. Unit: share. Source: a real UR10, whose shoulder
+    /// was given nonlinear friction beside Coulomb friction of −32 to −42 N m, had 0.7 to 1.4.
+    pub drives: f64,
 }
 
 pub(super) const SEARCH: Search = Search {
@@ -46,6 +51,8 @@ pub(super) const SEARCH: Search = Search {
     worth_a_word: 0.1,
     words: 8,
     rounds: 2,
+    brakes: [0.0, 0.1, 0.3, 1.0],
+    drives: 0.1,
 };
 
 /// How shapes are refined between the points of their grids.

@@ -1,7 +1,8 @@
 //! The set of effects: forward steps, pairs that mask each other, and exchanges.
 
-use super::super::evidence::Projected;
-use super::super::search::Candidate;
+use super::super::catalogue::Place;
+use super::super::evidence::{Fit, Projected};
+use super::super::search::{self, Candidate};
 use super::super::thresholds::THRESHOLDS as T;
 use super::predict::predicts;
 use super::rivals::{challengers, merit};
@@ -129,12 +130,30 @@ fn gained(st: &State, set: &[Candidate], i: usize) -> f64 {
     st.gain(set) - st.gain(&others(set, i))
 }
 
+/// Whether the friction at a place brakes with all members of a set that are there.
+fn brakes(st: &State, set: &[Candidate], place: &Place, fit: &Fit) -> bool {
+    let mut at = 0;
+    let mut there: Vec<search::Member> = Vec::new();
+    for c in set {
+        let own = &fit.eta[at..at + c.eta.len()];
+        at += own.len();
+        if c.place == *place {
+            there.push((st.effects[c.effect].as_ref(), &c.shape, own));
+        }
+    }
+    let all = || set.iter().map(|c| &c.projected).collect::<Vec<_>>();
+    search::brakes(st.cx, place, &there, || st.evidence.parameters(&all(), fit))
+}
+
 /// Whether member `i` of a set explains enough beside the others, also on holdout records.
 fn accepted(st: &State, set: &[Candidate], i: usize) -> bool {
     let data = st.evidence.data;
     let rows = data.fitted as f64;
-    let (f0, r0) = st.fit(&others(set, i));
     let (f1, r1) = st.fit(set);
+    if !brakes(st, set, &set[i].place, &f1) {
+        return false;
+    }
+    let (f0, r0) = st.fit(&others(set, i));
     let fall = |rows: Range<usize>| energy(&r0, rows.clone()) - energy(&r1, rows);
     let visible = fall(0..data.fitted);
     let prior = (f1.gain - f0.gain) - visible;
