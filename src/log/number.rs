@@ -110,7 +110,7 @@ fn product(mantissa: u64, power: i32) -> Option<f64> {
     let upper = (bits >> 63) as u32;
     let shift = upper + 9;
     let mut kept = bits >> shift;
-    // log₂ 5 is 152170/2¹⁶ with 2, rounded down
+    // log₂ 10 is 217706/2¹⁶
     let mut exponent = ((power * 217_706) >> 16) + 63 + upper as i32 - zeros as i32;
     // halfway between two numbers: to the even one
     if rest <= 1 && (-4..=23).contains(&power) && kept & 3 == 1 && kept << shift == bits {
