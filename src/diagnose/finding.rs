@@ -1,7 +1,7 @@
 //! Effects in the result: members of the set that was fitted, and what could stand in their place.
 
 use super::carried::Carried;
-use super::catalogue::{Context, Effect, Estimate, Place, Shape, Value, in_mujoco};
+use super::catalogue::{self, Context, Effect, Estimate, Place, Shape, Value, in_mujoco};
 use super::evidence::{Evidence, Projected};
 use super::interval;
 use super::thresholds::THRESHOLDS as T;
@@ -252,7 +252,7 @@ fn one_load(
     at: usize,
 ) -> Option<Finding> {
     let data = evidence.data;
-    let effect = effects.iter().find(|e| e.card().name == "payload")?;
+    let effect = catalogue::named(effects, "payload")?;
     let place = *effect.sites(cx).first()?;
     let eta = phi.get(at..at + 10)?.to_vec();
     let scale = super::verdict::inflation(&evidence.residual(&[], &evidence.fit(&[])), data.fitted);
@@ -275,6 +275,6 @@ fn one_load(
         decoys: Some(load.decoys),
         unsteady: Some(load.unsteady),
         frozen: true,
-        ..Finding::of(cx, effect.as_ref(), load_of)
+        ..Finding::of(cx, effect, load_of)
     })
 }

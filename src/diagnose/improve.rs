@@ -72,7 +72,7 @@ pub fn improve(
     let claims: Vec<Claim> = findings
         .iter()
         .filter(|f| f.is_claim())
-        .filter_map(|f| Some((named(effects, f)?, estimate(f))))
+        .filter_map(|f| Some((catalogue::named(effects, f.effect)?, estimate(f))))
         .collect();
     let found = written(evidence, cx, &phi[..count], &claims);
     let claimed = claims
@@ -134,12 +134,6 @@ fn estimate(f: &Finding) -> Estimate {
         eta: f.eta.clone(),
         std: vec![0.0; f.eta.len()],
     }
-}
-
-/// The effect of a finding.
-fn named<'e>(effects: &'e [Box<dyn Effect>], f: &Finding) -> Option<&'e dyn Effect> {
-    let found = effects.iter().find(|e| e.card().name == f.effect);
-    found.map(|e| e.as_ref())
 }
 
 /// A model for the files.

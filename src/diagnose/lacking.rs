@@ -378,12 +378,11 @@ impl Beyond<'_> {
         [before, held]: [&[f64]; 2],
     ) -> Vec<Finding> {
         let (data, evidence) = (self.evidence.data, st.evidence);
-        let named = |own: &Own| self.effects.iter().find(|e| e.card().name == own.effect);
         let shown = terms
             .iter()
             .filter(|own| data.parameters[own.at].value != 0.0);
         let all: Vec<(&Own, &dyn Effect)> = shown
-            .filter_map(|own| Some((own, named(own)?.as_ref())))
+            .filter_map(|own| Some((own, catalogue::named(self.effects, own.effect)?)))
             .collect();
         let columns = |(own, effect): &(&Own, &dyn Effect)| {
             effect.columns(self.cx, &own.place(), &Shape::default(), false)

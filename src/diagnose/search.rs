@@ -111,7 +111,7 @@ pub fn brakes(
 ) -> bool {
     let added = |speed: f64| -> Vec<f64> {
         let each = effects.iter();
-        each.filter_map(|(effect, shape, eta)| effect.brakes(cx, place, shape, eta, speed))
+        each.filter_map(|(effect, shape, eta)| effect.friction(cx, place, shape, eta, speed))
             .collect()
     };
     let top = cx.data.speed[place.first()];

@@ -8,6 +8,12 @@ use super::number;
 /// Rows that there is room for at first.
 const FEW: usize = 64;
 
+/// Whether a line that begins so may be a remark, or hold nothing.
+#[inline(always)]
+pub(super) fn may_be_idle(first: u8) -> bool {
+    matches!(first, b'\n' | b'\r' | b'#' | b'%' | b'/' | b' ')
+}
+
 /// Reads rows of plain numbers from the beginning of two texts, a number a column that is kept, into columns that are empty, up
 /// to the first line of either that is something else. Returns where it stopped in each, and the number of rows.
 pub(super) fn rows(
@@ -70,6 +76,25 @@ impl Numbers for Narrow {
     }
 }
 
+/// Where the cells end that stand at a place of each of two texts.
+///
+/// # Safety
+/// As [`Numbers::two`].
+#[inline(always)]
+unsafe fn both_ends<N: Numbers>(
+    texts: [&[u8]; 2],
+    at: [usize; 2],
+    delimiter: u8,
+) -> Option<[usize; 2]> {
+    // SAFETY: by the caller's promise
+    unsafe {
+        Some([
+            N::end(texts[0], at[0], delimiter)?,
+            N::end(texts[1], at[1], delimiter)?,
+        ])
+    }
+}
+
 /// [`rows`] in one of the ways.
 ///
 /// # Safety
@@ -84,11 +109,8 @@ unsafe fn rows_by<N: Numbers>(
     let n = keep.len();
     let mut brief = vec![[true; 2]; n];
     let (mut at, mut done) = ([0; 2], 0);
-    let kept = |columns: &[Vec<f64>]| {
-        let kept = columns.iter().zip(keep).filter(|(_, keep)| **keep);
-        kept.map(|(c, _)| c.capacity()).min()
-    };
-    let Some(room) = kept(x) else {
+    let kept = x.iter().zip(keep).filter(|(_, keep)| **keep);
+    let Some(room) = kept.map(|(c, _)| c.capacity()).min() else {
         return (at, done);
     };
     let mut room = room.max(FEW);
@@ -106,38 +128,27 @@ unsafe fn rows_by<N: Numbers>(
             .collect();
         while done < room {
             let mut next = at;
-            // numbers tell a row; a line that does not begin with one may be a remark
-            let remark =
-                |k: usize| matches!(texts[k].get(next[k]), None | Some(b'#' | b'%' | b'/'));
-            if !keep[0] && (remark(0) || remark(1)) {
+            // a line that has to begin with a number is no remark
+            let idle = |k: usize| texts[k].get(next[k]).is_some_and(|c| may_be_idle(*c));
+            if !keep[0] && (idle(0) || idle(1)) {
                 break 'rows;
             }
             for (k, (to, brief)) in to.iter_mut().zip(&mut brief).enumerate() {
-                let (a, b);
-                match to {
-                    Some([x, y]) => {
-                        // SAFETY: by the caller's promise
-                        let found = unsafe { N::two(texts, next, delimiter, brief) };
-                        let Some([(u, end), (v, other)]) = found else {
-                            break 'rows;
-                        };
-                        (x[done], y[done]) = (u, v);
-                        (a, b) = (end, other);
+                // SAFETY: by the caller's promise
+                let ends = unsafe {
+                    match to {
+                        Some([x, y]) => {
+                            N::two(texts, next, delimiter, brief).map(|[(u, a), (v, b)]| {
+                                (x[done], y[done]) = (u, v);
+                                [a, b]
+                            })
+                        }
+                        None => both_ends::<N>(texts, next, delimiter),
                     }
-                    None => {
-                        // SAFETY: by the caller's promise
-                        let ends = unsafe {
-                            (
-                                N::end(texts[0], next[0], delimiter),
-                                N::end(texts[1], next[1], delimiter),
-                            )
-                        };
-                        let (Some(end), Some(other)) = ends else {
-                            break 'rows;
-                        };
-                        (a, b) = (end, other);
-                    }
-                }
+                };
+                let Some([a, b]) = ends else {
+                    break 'rows;
+                };
                 let last = k + 1 == n;
                 if (texts[0][a] == b'\n') != last || (texts[1][b] == b'\n') != last {
                     break 'rows;
@@ -292,6 +303,37 @@ mod wide {
         }
     }
 
+    /// Whether the number of a cell is negative, where it begins behind a blank and a sign, and where the cell ends. `None` at the very beginning and the
+    /// end of a text, where sixteen bytes before it and 33 from its beginning are not all there, and of longer cells.
+    ///
+    /// # Safety
+    /// The machine must have AVX2.
+    #[inline(always)]
+    unsafe fn bounds(text: &[u8], at: usize, delimiter: u8) -> Option<(bool, usize, usize)> {
+        if at < CELL || at + AHEAD >= text.len() {
+            return None;
+        }
+        let at = at + usize::from(text[at] == b' ');
+        // SAFETY: 32 bytes are there
+        let size = unsafe { ends(text, at, delimiter) }.trailing_zeros() as usize;
+        let negative = text[at] == b'-';
+        (size < AHEAD).then_some((negative, at + usize::from(negative), at + size))
+    }
+
+    /// The last `length` of sixteen digits before a place, or all of them, with zeros in front.
+    ///
+    /// # Safety
+    /// The place must be in the text, behind sixteen bytes, and the machine must have AVX2.
+    #[inline(always)]
+    unsafe fn digits(text: &[u8], stop: usize, length: usize) -> __m128i {
+        // SAFETY: by the caller's promise, and of the mask there are sixteen bytes from sixteen or less on
+        unsafe {
+            let all = _mm_loadu_si128(text.as_ptr().add(stop - CELL).cast());
+            let mask = _mm_loadu_si128(LAST.as_ptr().add(length.min(CELL)).cast());
+            _mm_and_si128(_mm_xor_si128(all, _mm_set1_epi8(b'0' as i8)), mask)
+        }
+    }
+
     /// A cell of digits with a point among them.
     struct Cell {
         /// its digits, in the last bytes of sixteen
@@ -303,38 +345,21 @@ mod wide {
     }
 
     impl Cell {
-        /// The one that starts at a place, if it is digits with one point and there are no more than fifteen; none at the very
-        /// beginning and the end of a text, where sixteen bytes before its end and 33 from its beginning are not all there.
+        /// The one that starts at a place, if it is digits with one point and there are no more than fifteen.
         ///
         /// # Safety
         /// The machine must have AVX2.
         #[inline(always)]
         unsafe fn at(text: &[u8], at: usize, delimiter: u8) -> Option<Cell> {
-            if at < CELL || at + AHEAD >= text.len() {
-                return None;
-            }
-            // a blank behind the delimiter
-            let at = at + usize::from(text[at] == b' ');
-            let negative = text[at] == b'-';
-            // SAFETY: 32 bytes are there
-            let ends = unsafe { ends(text, at, delimiter) };
-            let size = ends.trailing_zeros() as usize;
-            let length = size.wrapping_sub(usize::from(negative));
+            // SAFETY: by the caller's promise
+            let (negative, first, end) = unsafe { bounds(text, at, delimiter) }?;
+            let length = end - first;
             // a digit and a point at least
             if !(2..=CELL).contains(&length) {
                 return None;
             }
-            let end = at + size;
-            // SAFETY: the end is beyond the sixteenth byte and within the text, and `length` is at most 16
-            let digits = unsafe {
-                _mm_and_si128(
-                    _mm_xor_si128(
-                        _mm_loadu_si128(text.as_ptr().add(end - CELL).cast()),
-                        _mm_set1_epi8(b'0' as i8),
-                    ),
-                    _mm_loadu_si128(LAST.as_ptr().add(length).cast()),
-                )
-            };
+            // SAFETY: the end is beyond the sixteenth byte and within the text
+            let digits = unsafe { digits(text, end, length) };
             // SAFETY: by the caller's promise
             let [others, points] = unsafe { strangers(digits) };
             if others != points || !others.is_power_of_two() {
@@ -367,24 +392,14 @@ mod wide {
 
     impl Long {
         /// The one that starts at a place, if it is up to nineteen digits, with one point among them or none, and perhaps
-        /// `e±dd`; none where [`Cell::at`] has none.
+        /// `e±dd`.
         ///
         /// # Safety
         /// The machine must have AVX2.
         #[inline(always)]
         unsafe fn at(text: &[u8], at: usize, delimiter: u8) -> Option<Long> {
-            if at < CELL || at + AHEAD >= text.len() {
-                return None;
-            }
-            let at = at + usize::from(text[at] == b' ');
-            let negative = text[at] == b'-';
-            let first = at + usize::from(negative);
-            // SAFETY: 32 bytes are there
-            let size = unsafe { ends(text, at, delimiter) }.trailing_zeros() as usize;
-            if size == AHEAD {
-                return None;
-            }
-            let end = at + size;
+            // SAFETY: by the caller's promise
+            let (negative, first, end) = unsafe { bounds(text, at, delimiter) }?;
             let mut stop = end - usize::from(text[end - 1] == b'\r' && text[end] == b'\n');
             let mut power = 0;
             if let [e, sign, tens, ones] = text[stop - 4..stop]
@@ -398,16 +413,8 @@ mod wide {
                 stop -= 4;
             }
             let length = stop.checked_sub(first)?;
-            // SAFETY: sixteen bytes are there before any cell, and of the mask there are as many from sixteen or less on
-            let low = unsafe {
-                _mm_and_si128(
-                    _mm_xor_si128(
-                        _mm_loadu_si128(text.as_ptr().add(stop - CELL).cast()),
-                        _mm_set1_epi8(b'0' as i8),
-                    ),
-                    _mm_loadu_si128(LAST.as_ptr().add(length.min(CELL)).cast()),
-                )
-            };
+            // SAFETY: it stops behind its first byte, which is beyond the sixteenth of the text
+            let low = unsafe { digits(text, stop, length) };
             // SAFETY: by the caller's promise
             let [others, points] = unsafe { strangers(low) };
             let (mut before, mut behind) = (0, None);
@@ -637,11 +644,18 @@ mod tests {
     /// A remark is no row, also where its line has as many cells and the first one is passed over.
     #[test]
     fn remarks_stop_both() {
-        let text = "AUTO,1.5\n".repeat(4) + "# pause,2.5\n" + &"AUTO,1.5\n".repeat(9);
-        for way in ways() {
-            let [mut x, mut y] = [(); 2].map(|()| vec![Vec::new(); 2]);
-            let found = way([text.as_bytes(); 2], &[false, true], [&mut x, &mut y]);
-            assert_eq!(found, ([36; 2], 4));
+        for remark in [
+            "# pause,2.5\n",
+            "  # pause,2.5\n",
+            "// pause,2.5\n",
+            "%,2.5\n",
+        ] {
+            let text = "AUTO,1.5\n".repeat(4) + remark + &"AUTO,1.5\n".repeat(9);
+            for way in ways() {
+                let [mut x, mut y] = [(); 2].map(|()| vec![Vec::new(); 2]);
+                let found = way([text.as_bytes(); 2], &[false, true], [&mut x, &mut y]);
+                assert_eq!(found, ([36; 2], 4), "{remark}");
+            }
         }
     }
 }

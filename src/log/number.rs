@@ -177,7 +177,6 @@ fn decimal(text: &[u8], start: usize) -> Decimal {
 #[inline]
 pub fn parse(cell: &[u8]) -> Option<f64> {
     let mut i = 0;
-    let n = cell.len();
     let negative = match cell.first() {
         Some(b'-') => {
             i = 1;
@@ -189,28 +188,31 @@ pub fn parse(cell: &[u8]) -> Option<f64> {
         }
         _ => false,
     };
+    match unsigned(cell, i) {
+        Some((x, end)) if end == cell.len() => Some(if negative { -x } else { x }),
+        _ => slow(cell),
+    }
+}
+
+/// The number without a sign that starts at a place of a text, and where it ends; `None` of one that is rounded elsewhere, or none.
+#[inline(always)]
+fn unsigned(text: &[u8], at: usize) -> Option<(f64, usize)> {
     let Decimal {
         mantissa,
         digits,
         point,
-        end,
-    } = decimal(cell, i);
-    i = end;
-    let mut exponent = -(point as i32);
-    if digits == 0 || digits > 19 && significant(&cell[..end]) > 19 {
-        return slow(cell);
+        mut end,
+    } = decimal(text, at);
+    if digits == 0 || digits > 19 && significant(&text[at..end]) > 19 {
+        return None;
     }
-    if let Some((e, at)) = exponent_of(cell, i) {
-        exponent += e;
-        i = at;
+    let mut power = -(point as i32);
+    if text.get(end).is_some_and(|c| c | 0x20 == b'e') {
+        let (e, behind) = exponent_of(text, end)?;
+        power += e;
+        end = behind;
     }
-    if i != n {
-        return slow(cell);
-    }
-    match nearest(mantissa, exponent) {
-        Some(x) => Some(if negative { -x } else { x }),
-        None => slow(cell),
-    }
+    Some((nearest(mantissa, power)?, end))
 }
 
 /// Digits of a decimal from the first that is not zero on.
@@ -221,12 +223,9 @@ fn significant(decimal: &[u8]) -> usize {
     rest.iter().filter(|b| b.is_ascii_digit()).count()
 }
 
-/// The exponent that stands at a place of a text, `e` and up to five digits, and where it ends.
+/// The exponent of an `e` at a place of a text, up to five digits, and where it ends.
 #[inline(always)]
 fn exponent_of(text: &[u8], at: usize) -> Option<(i32, usize)> {
-    if text.get(at)? | 0x20 != b'e' {
-        return None;
-    }
     let sign = *text.get(at + 1)?;
     let from = at + 1 + usize::from(matches!(sign, b'-' | b'+'));
     let digits = text[from..].iter().take(6);
@@ -301,23 +300,8 @@ fn long(text: &[u8], at: usize, delimiter: u8) -> Option<(f64, usize)> {
         at += 1;
     }
     let negative = text[at] == b'-';
-    let Decimal {
-        mantissa,
-        digits,
-        point,
-        mut end,
-    } = decimal(text, at + usize::from(negative));
-    if digits == 0 || digits > 19 && significant(&text[at..end]) > 19 {
-        return None;
-    }
-    let mut power = -(point as i32);
+    let (x, mut end) = unsigned(text, at + usize::from(negative))?;
     let mut next = *text.get(end)?;
-    if next | 0x20 == b'e' {
-        let (e, behind) = exponent_of(text, end)?;
-        power += e;
-        end = behind;
-        next = *text.get(end)?;
-    }
     if next == b'\r' {
         end += 1;
         next = *text.get(end)?;
@@ -325,7 +309,6 @@ fn long(text: &[u8], at: usize, delimiter: u8) -> Option<(f64, usize)> {
     if next != b'\n' && (next != delimiter || text[end - 1] == b'\r') {
         return None;
     }
-    let x = nearest(mantissa, power)?;
     Some((if negative { -x } else { x }, end))
 }
 

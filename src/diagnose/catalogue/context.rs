@@ -150,11 +150,15 @@ impl<'a> Context<'a> {
 
     /// The same where `phi` are the parameters.
     pub fn term_of(&self, place: &Place, term: JointTerm, phi: &[f64]) -> f64 {
+        self.unknown(place, term)
+            .map_or_else(|| self.stated(place, term), |at| phi[at])
+    }
+
+    /// Where a term of an actuator stands among the parameters of the model, if it is one.
+    fn unknown(&self, place: &Place, term: JointTerm) -> Option<usize> {
         let joint = self.data.plant.actuated()[place.first()];
         let kind = plant::Column::Term { joint, term };
-        let mut all = self.data.parameters.iter();
-        let at = all.position(|p| p.kind == kind);
-        at.map_or_else(|| self.stated(place, term), |at| phi[at])
+        self.data.parameters.iter().position(|p| p.kind == kind)
     }
 
     /// The whole of a term of which an effect adds a part.
@@ -165,14 +169,9 @@ impl<'a> Context<'a> {
     /// Actuators whose term of this kind may be another than the nominal model has it: all of an identified model; of a rough one those
     /// of which it has no unknown, because whatever value a refit gives the others is ordinary.
     pub fn changed(&self, term: JointTerm) -> Vec<Place> {
-        let plant = self.data.plant;
-        let listed = |place: &Place| {
-            let joint = plant.actuated()[place.first()];
-            let kind = plant::Column::Term { joint, term };
-            self.data.parameters.iter().any(|p| p.kind == kind)
-        };
+        let identified = self.data.plant.prior() == Prior::Identified;
         let mut all = self.singles();
-        all.retain(|place| plant.prior() == Prior::Identified || !listed(place));
+        all.retain(|place| identified || self.unknown(place, term).is_none());
         all
     }
 

@@ -202,9 +202,9 @@ pub trait Effect: Sync {
     fn plausible(&self, _cx: &Context, _place: &Place, _shape: &Shape, _eta: &[f64]) -> bool {
         true
     }
-    /// What it adds to the friction of its joint at a steady speed, N m or N; `None` of what is no such friction, or may not have
-    /// to brake by itself.
-    fn brakes(
+    /// What it adds to the friction of its joint at a steady speed, N m or N; `None` of what is no friction that depends on the
+    /// speed alone.
+    fn friction(
         &self,
         _cx: &Context,
         _place: &Place,
@@ -276,6 +276,12 @@ pub fn all() -> Vec<Box<dyn Effect>> {
         Box::new(leg_inertia::LegInertia),
         Box::new(leg_geometry::LegGeometry),
     ]
+}
+
+/// The one of this name.
+pub fn named<'e>(effects: &'e [Box<dyn Effect>], name: &str) -> Option<&'e dyn Effect> {
+    let found = effects.iter().find(|e| e.card().name == name);
+    found.map(|e| e.as_ref())
 }
 
 /// How the files for MuJoCo hold an effect.

@@ -53,7 +53,7 @@ impl Effect for NonlinearViscousFriction {
         vec![Column::on(j, cx.data.own(j, |_, v| power(v)))]
     }
 
-    fn brakes(
+    fn friction(
         &self,
         cx: &Context,
         place: &Place,

@@ -122,7 +122,7 @@ impl Effect for StribeckFriction {
         eta[0] > 0.0 && eta[0] < most && enough
     }
 
-    fn brakes(
+    fn friction(
         &self,
         _cx: &Context,
         _place: &Place,

@@ -3,10 +3,11 @@
 use super::*;
 use crate::diagnose::data::Data;
 use crate::diagnose::evidence::{Evidence, Projected};
+use crate::diagnose::search;
 use crate::diagnose::window::averaged;
 use crate::export::{self, Model};
 use crate::mechanism::Mechanism;
-use crate::plant::Plant;
+use crate::plant::{self, Plant};
 use crate::signals::series::Series;
 use rand::{Rng, SeedableRng};
 use std::collections::BTreeSet;
@@ -437,18 +438,27 @@ fn only_torque_that_is_ahead_may_not_explain_a_part() {
     }
 }
 
+fn with_friction() -> Plant {
+    let plant = Plant::load("planar2").unwrap();
+    plant.with_terms(&JointTerm::FRICTION)
+}
+
+/// A record in which a robot is as its file.
+fn moved(plant: &Plant) -> Data<'_> {
+    let x = motion(plant);
+    let tau = noisy(&measured(plant, &x));
+    Data::new(plant, vec![record(plant, &x, tau)]).unwrap()
+}
+
 /// Deviations of parameters beside an effect are those of all unknowns together.
 #[test]
 fn parameters_are_less_known_beside_an_effect() {
-    let plant = Plant::load("planar2").unwrap();
-    let plant = plant.with_terms(&JointTerm::FRICTION);
-    let x = motion(&plant);
-    let tau = noisy(&measured(&plant, &x));
-    let data = Data::new(&plant, vec![record(&plant, &x, tau)]).unwrap();
+    let plant = with_friction();
+    let data = moved(&plant);
     let cx = Context::new(&data, plant.values()).unwrap();
     let evidence = Evidence::new(&data, 1.0);
     let effects = all();
-    let effect = of_name(&effects, "nonlinear_viscous_friction");
+    let effect = named(&effects, "nonlinear_viscous_friction").unwrap();
     let columns = effect.columns(&cx, &Place::Actuator(0), &Shape::of(&[0.7]), false);
     let projected = evidence.project(&columns);
     let set = [&projected];
@@ -474,11 +484,8 @@ fn parameters_are_less_known_beside_an_effect() {
 /// Friction that would drive its joint at some speed is none.
 #[test]
 fn friction_brakes_at_all_speeds() {
-    let plant = Plant::load("planar2").unwrap();
-    let plant = plant.with_terms(&JointTerm::FRICTION);
-    let x = motion(&plant);
-    let tau = noisy(&measured(&plant, &x));
-    let data = Data::new(&plant, vec![record(&plant, &x, tau)]).unwrap();
+    let plant = with_friction();
+    let data = moved(&plant);
     let cx = Context::new(&data, plant.values()).unwrap();
     let effects = all();
     let [grows, rises] = ["nonlinear_viscous_friction", "stribeck_friction"];
@@ -487,7 +494,7 @@ fn friction_brakes_at_all_speeds() {
         let mut phi = plant.values();
         for (p, x) in plant.parameters().iter().zip(&mut phi) {
             *x = match p.kind {
-                crate::plant::Column::Term { joint: 0, term } => match term {
+                plant::Column::Term { joint: 0, term } => match term {
                     JointTerm::Viscous => viscous,
                     JointTerm::Coulomb => coulomb,
                     _ => *x,
@@ -496,11 +503,11 @@ fn friction_brakes_at_all_speeds() {
             };
         }
         let of: Vec<_> = of.iter().map(|(n, s, eta)| (*n, s, [*eta])).collect();
-        let members: Vec<crate::diagnose::search::Member> = of
+        let members: Vec<search::Member> = of
             .iter()
-            .map(|(name, shape, eta)| (of_name(&effects, name), *shape, &eta[..]))
+            .map(|(name, shape, eta)| (named(&effects, name).unwrap(), *shape, &eta[..]))
             .collect();
-        crate::diagnose::search::brakes(&cx, &place, &members, || phi)
+        search::brakes(&cx, &place, &members, || phi)
     };
     let power = |a: f64, eta: f64| (grows, Shape::of(&[a]), eta);
     let rise = |eta: f64| (rises, Shape::of(&[0.1 * top, 2.0]), eta);
@@ -518,9 +525,4 @@ fn friction_brakes_at_all_speeds() {
     assert!(!brakes(&[power(2.0, -12.0)], 6.0 / top, 1.0));
     // nothing that has to brake
     assert!(brakes(&[], -6.0, -6.0));
-}
-
-fn of_name<'a>(effects: &'a [Box<dyn Effect>], name: &str) -> &'a dyn Effect {
-    let found = effects.iter().find(|e| e.card().name == name);
-    found.expect("an effect of the catalogue").as_ref()
 }

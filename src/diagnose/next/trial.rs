@@ -1,7 +1,7 @@
 //! A motion judged before it is run: how far it tells effects apart.
 
 use super::motions::PERIODS;
-use crate::diagnose::catalogue::{Context, Effect, Place, Shape};
+use crate::diagnose::catalogue::{self, Context, Effect, Place, Shape};
 use crate::diagnose::data::Data;
 use crate::diagnose::evidence::{Evidence, Projected};
 use crate::diagnose::finding::Finding;
@@ -38,9 +38,9 @@ pub(super) struct Placed<'a> {
 
 impl<'a> Placed<'a> {
     pub fn of_finding(effects: &'a [Box<dyn Effect>], f: &'a Finding) -> Option<Self> {
-        let effect = effects.iter().find(|e| e.card().name == f.effect)?;
+        let effect = catalogue::named(effects, f.effect)?;
         Some(Placed {
-            effect: effect.as_ref(),
+            effect,
             place: &f.place,
             shape: &f.shape,
             // coefficients of directions that the records choose are of these records alone

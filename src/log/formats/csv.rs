@@ -524,7 +524,7 @@ fn rest(text: &[u8], from: usize, delimiter: u8, cells: &[Cell], keep: &[bool], 
     while at < text.len() {
         out.lines += 1;
         out.last = false;
-        if matches!(text[at], b'\n' | b'\r' | b'#' | b'%' | b'/' | b' ') {
+        if abreast::may_be_idle(text[at]) {
             let end = text[at..]
                 .iter()
                 .position(|b| *b == b'\n')
