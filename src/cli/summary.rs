@@ -2,6 +2,7 @@
 
 use excite::base::parts::Identifiability;
 use excite::design::parts::{Record, Status};
+use excite::identifiability::json::INFINITE;
 use excite::identifiability::parts::{Answer, LoadAccuracy};
 use excite::identifiability::{Assessment, Excitation};
 use std::fmt::Write;
@@ -118,6 +119,14 @@ fn load(l: &LoadAccuracy) -> String {
     out
 }
 
+/// A condition number.
+fn size(x: f64) -> String {
+    match x >= INFINITE {
+        true => "∞".into(),
+        false => format!("{x:.3}"),
+    }
+}
+
 fn excitation(a: &Assessment, e: &Excitation) -> String {
     let mut out = String::new();
     let torque_noise = &a.torque_noise;
@@ -130,7 +139,7 @@ fn excitation(a: &Assessment, e: &Excitation) -> String {
         ("weighted", c.weighted),
     ];
     let others = all.iter().filter(|(n, _)| *n != name);
-    let others: Vec<String> = others.map(|(n, v)| format!("{n} {v:.3}")).collect();
+    let others: Vec<String> = others.map(|(n, v)| format!("{n} {}", size(*v))).collect();
     let what = if a.unit_columns() {
         " of unit columns"
     } else {
@@ -138,7 +147,8 @@ fn excitation(a: &Assessment, e: &Excitation) -> String {
     };
     let _ = writeln!(
         out,
-        "condition number{what} {headline:.3} ({})",
+        "condition number{what} {} ({})",
+        size(headline),
         others.join(", ")
     );
     let verdict = match e.certificate.satisfied {
@@ -192,6 +202,7 @@ fn excitation(a: &Assessment, e: &Excitation) -> String {
     if let Some(p) = e.predictions.first() {
         let (good, judged) = e.known(10.0);
         let worst = match p.percent {
+            _ if p.std >= INFINITE => "not at all".into(),
             Some(x) => format!("{x:.1} %"),
             None => format!("{:.2e} {} about 0", p.std, p.unit),
         };

@@ -8,6 +8,7 @@
 //! margin.
 
 use super::matter::LeftOuts;
+use super::mend::ENOUGH;
 use super::scene::{Pair, Partner, Scene, Volume};
 use super::srdf;
 use crate::error::{Error, Result, Warning, WarningKind};
@@ -32,7 +33,7 @@ pub const FLOOR: &str = "floor";
 /// # Errors
 /// An SRDF that cannot be read; no posture without contact: the pairs that are in the way.
 pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
-    let mut found = with_volumes(robot, postures);
+    let mut found = with_volumes(robot, postures, false);
     let mut robot = robot.clone();
     for most in FINER {
         let hard: Vec<usize> = match &found {
@@ -55,13 +56,22 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
             break;
         }
         robot.geometry = robot.geometry.finer(&hard, most);
-        found = with_volumes(&robot, postures);
+        found = with_volumes(&robot, postures, false);
+    }
+    let few = match &found {
+        Ok(None) => false,
+        Ok(Some(scene)) => !postures.is_empty() && scene.free.len() < ENOUGH,
+        Err(_) => true,
+    };
+    if few {
+        found = with_volumes(&robot, postures, true);
     }
     found
 }
 
-/// The scene with the volumes that the robot's geometry has.
-fn with_volumes(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
+/// The scene with the volumes that the robot's geometry has. Where few postures are free of contact and `mend` is set, links are
+/// moved apart in others.
+fn with_volumes(robot: &Robot, postures: &[Vec<f64>], mend: bool) -> Result<Option<Scene>> {
     let geometry = &robot.geometry;
     if geometry.is_empty() || geometry.check == Some(false) {
         return Ok(None);
@@ -96,7 +106,7 @@ fn with_volumes(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
     let ignored = ignored(geometry, &mut scene.warnings)?;
     scene.pair_up(robot, &joined, &ignored);
     scene.keep_in(robot);
-    scene.sample(robot, postures)?;
+    scene.sample(robot, postures, mend)?;
     Ok(Some(scene))
 }
 

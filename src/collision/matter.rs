@@ -1,5 +1,6 @@
 //! Which pairs of a scene matter: those that can come near and can be kept apart, in many postures.
 
+use super::mend::{ENOUGH, LEAST, Mended, mended};
 use super::scene::{Balls, LeftOut, Pair, Partner, Scene, poses};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Robot;
@@ -16,28 +17,27 @@ const SLIM: f64 = 5e-3;
 const NEARLY_ALL: f64 = 0.9;
 /// They keep this part of their median distance.
 const PART: f64 = 0.5;
-/// Free postures that are kept.
-const KEPT: usize = 400;
+/// What to do where links or their surroundings are too near.
+const REMEDY: &str = "Check [[obstacle]], `floor` and `margin`, hold joints that stand still in the run, as those of a hand, with \
+                      `lock`, name pairs that may touch in `ignore` (`excite new` writes a robot.toml that has all of these), \
+                      or look at no collision (--no-collision)";
 
 impl Scene {
     /// Looks at the pairs in many postures: leaves out those that no posture keeps apart, and keeps postures
-    /// without contact.
-    pub(super) fn sample(&mut self, robot: &Robot, postures: &[Vec<f64>]) -> Result<()> {
+    /// without contact. Where these are few and `mend` is set, links are moved apart in others.
+    pub(super) fn sample(
+        &mut self,
+        robot: &Robot,
+        postures: &[Vec<f64>],
+        mend: bool,
+    ) -> Result<()> {
         if postures.is_empty() {
             return Ok(());
         }
         let balls = Balls::new(self);
         let mut rooms: Vec<Vec<f64>> = postures
             .par_iter()
-            .map(|q| {
-                let mut at = Vec::new();
-                poses(robot, q, &mut at);
-                let room = |p: &Pair| match balls.lower_bound(p, &at) - p.margin {
-                    far if far > FAR => far,
-                    _ => self.separation(p, &at).distance - p.margin,
-                };
-                self.pairs.iter().map(room).collect()
-            })
+            .map(|q| self.rooms(robot, &balls, q))
             .collect();
         self.own_margins(&mut rooms);
         // what stands around can be too near for ever only of a body that the base carries
@@ -74,24 +74,32 @@ impl Scene {
             ));
         }
         self.always_near = always;
-        let mut free: Vec<(f64, usize)> = rooms
-            .iter()
-            .enumerate()
-            .map(|(i, r)| {
-                let kept = r.iter().zip(&never).filter(|(_, n)| !**n);
-                (kept.map(|(d, _)| *d).fold(f64::INFINITY, f64::min), i)
-            })
+        let mut free: Vec<(f64, Vec<f64>)> = (rooms.iter().zip(postures))
+            .map(|(r, q)| (least(r, &never), q))
             .filter(|(room, _)| *room >= 0.0)
+            .map(|(room, q)| (room, q.clone()))
             .collect();
-        if free.is_empty() {
-            return Err(self.no_room(robot, &rooms, &never));
+        if mend && free.len() < ENOUGH {
+            let mut found = mended(self, robot, postures, &rooms, &never);
+            if free.is_empty() && !found.iter().any(Mended::free) {
+                let best = self.narrow(robot, found, &never);
+                let best = best.map_err(|stuck| self.no_room(robot, &rooms, &never, &stuck))?;
+                found = mended(self, robot, postures, &rooms, &never);
+                found.push(best);
+            }
+            free.extend(
+                found
+                    .into_iter()
+                    .filter(Mended::free)
+                    .map(|m| (m.room, m.posture)),
+            );
         }
-        free.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        self.free = free
-            .iter()
-            .take(KEPT)
-            .map(|(_, i)| postures[*i].clone())
-            .collect();
+        if free.is_empty() {
+            return Err(self.no_room(robot, &rooms, &never, &[]));
+        }
+        // of two with the same room the first one stays first
+        free.sort_by(|a, b| b.0.total_cmp(&a.0));
+        self.free = free.into_iter().map(|(_, q)| q).collect();
         let most = |p: usize| rooms.iter().map(|r| r[p]).fold(0.0, f64::max);
         self.most = (0..self.pairs.len())
             .filter(|p| !never[*p])
@@ -143,8 +151,89 @@ impl Scene {
         }
     }
 
-    /// Which pairs leave no free posture: those in contact most often.
-    fn no_room(&self, robot: &Robot, rooms: &[Vec<f64>], never: &[bool]) -> Error {
+    /// Room of every pair beyond its margin in a posture.
+    fn rooms(&self, robot: &Robot, balls: &Balls, q: &[f64]) -> Vec<f64> {
+        let mut at = Vec::new();
+        poses(robot, q, &mut at);
+        let room = |p: &Pair| match balls.lower_bound(p, &at) - p.margin {
+            far if far > FAR => far,
+            _ => self.separation(p, &at).distance - p.margin,
+        };
+        self.pairs.iter().map(room).collect()
+    }
+
+    /// Where no posture leaves every pair its margin: two links that are nearer in the best one, but apart, keep a part of the
+    /// distance that they have there. The best one, with the room that it has then.
+    ///
+    /// # Errors
+    /// In words: volumes that overlap there, or are too near to what stands around.
+    fn narrow(
+        &mut self,
+        robot: &Robot,
+        mended: Vec<Mended>,
+        never: &[bool],
+    ) -> std::result::Result<Mended, Vec<String>> {
+        let best = mended
+            .into_iter()
+            .min_by(|a, b| a.missing.total_cmp(&b.missing))
+            .ok_or_else(Vec::new)?;
+        let own = |distance: f64| (PART * distance).min(distance - LEAST);
+        let rooms = self.rooms(robot, &Balls::new(self), &best.posture);
+        let mut links: BTreeMap<[String; 2], f64> = BTreeMap::new();
+        let mut stuck: Vec<String> = Vec::new();
+        for (p, pair) in self.pairs.iter().enumerate() {
+            if never[p] || rooms[p] >= LEAST {
+                continue;
+            }
+            let [a, b] = self.names(pair).map(String::from);
+            let distance = rooms[p] + pair.margin;
+            if matches!(pair.partner, Partner::Volume(_)) && own(distance) >= HARDLY {
+                let known = links.entry([a, b]).or_insert(distance);
+                *known = known.min(distance);
+            } else {
+                stuck.push(format!("{a} and {b} {:.1} mm", 1e3 * distance));
+            }
+        }
+        if !stuck.is_empty() {
+            return Err(stuck);
+        }
+        let mut told = Vec::new();
+        for ([a, b], distance) in links {
+            for pair in &mut self.pairs {
+                let Partner::Volume(v) = pair.partner else {
+                    continue;
+                };
+                if self.volumes[pair.volume].link == a && self.volumes[v].link == b {
+                    pair.margin = pair.margin.min(own(distance));
+                }
+            }
+            told.push(format!("{a} and {b} {:.1} mm", 1e3 * own(distance)));
+        }
+        self.warnings.push(Warning::new(
+            WarningKind::MarginReduced,
+            "collisions",
+            format!(
+                "no posture keeps everything apart by the margin of {:.1} mm. These links keep half of the distance that \
+                 they have in the best one, or less: {}. {REMEDY}",
+                1e3 * self.margin,
+                told.join("; ")
+            ),
+        ));
+        let rooms = self.rooms(robot, &Balls::new(self), &best.posture);
+        Ok(Mended {
+            room: least(&rooms, never),
+            ..best
+        })
+    }
+
+    /// Which pairs leave no free posture: those in contact most often, and those that are `stuck` where links were moved apart.
+    fn no_room(
+        &self,
+        robot: &Robot,
+        rooms: &[Vec<f64>],
+        never: &[bool],
+        stuck: &[String],
+    ) -> Error {
         let mut often: Vec<(usize, usize)> = (0..self.pairs.len())
             .filter(|p| !never[*p])
             .map(|p| (rooms.iter().filter(|r| r[p] < 0.0).count(), p))
@@ -165,14 +254,31 @@ impl Scene {
         }
         Error::Infeasible(format!(
             "{}: none of {} random postures is free of contact at a margin of {} m; most often in contact: \
-             {}. Check [[obstacle]], `floor` and `margin`, name pairs that may touch in `ignore`, or look at \
-             no collision (--no-collision)",
+             {}{}. {REMEDY}",
             robot.name,
             rooms.len(),
             self.margin,
-            named.join(", ")
+            named.join(", "),
+            match stuck.len() {
+                0 => String::new(),
+                n => format!(
+                    "; in the best one that was found, links moved apart, these are too near: {}{}",
+                    stuck[..n.min(3)].join("; "),
+                    if n > 3 {
+                        format!("; and {} more", n - 3)
+                    } else {
+                        String::new()
+                    }
+                ),
+            }
         ))
     }
+}
+
+/// Least room of the pairs that are looked at.
+fn least(rooms: &[f64], never: &[bool]) -> f64 {
+    let kept = rooms.iter().zip(never).filter(|(_, n)| !**n);
+    kept.map(|(room, _)| *room).fold(f64::INFINITY, f64::min)
 }
 
 /// Pairs of names that are left out, each once.

@@ -87,6 +87,7 @@ impl Problem<'_> {
             task: &task,
             seed: settings.seed,
             rough: settings.rough,
+            postures: pool.install(|| start::holding(&task, self.basis)),
         };
         let mut search = Search::default();
         pool.install(|| -> Result<()> {
@@ -192,36 +193,59 @@ impl Problem<'_> {
         }
     }
 
-    /// Why there is no feasible trajectory.
+    /// Why there is no feasible trajectory: what the best posture breaks at rest.
     fn infeasible(&self) -> String {
-        let rest: Vec<f64> = (0..self.plant.coordinates())
-            .flat_map(|j| self.limits.rest_parameters(j))
-            .collect();
-        let mut motion = Default::default();
-        self.info.sample(&rest, &mut motion);
-        let broken = match self.path {
-            Some(path) => path.broken(self.info, &rest, &motion),
-            None => String::new(),
+        let name = self.plant.name();
+        let middle = || -> Vec<f64> {
+            let joints = 0..self.plant.coordinates();
+            joints
+                .flat_map(|j| self.limits.rest_parameters(j))
+                .collect()
         };
+        let broken = self.path.map_or(String::new(), |path| {
+            let (mut motion, mut memory) = Default::default();
+            let mut use_of = |x: &Vec<f64>| {
+                self.info.sample(x, &mut motion);
+                let used = path.used(self.info, x, &motion, &mut memory);
+                if used.is_nan() { f64::INFINITY } else { used }
+            };
+            let known = match self.settings.start {
+                Some(_) => &[],
+                None => path.postures(),
+            };
+            let (x, place) = (known.iter())
+                .map(|posture| start::standing(self.basis, posture))
+                .map(|x| (use_of(&x), x))
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(_, x)| {
+                    let place = format!("in the best of {} postures free of contact", known.len());
+                    (x, place)
+                })
+                .unwrap_or_else(|| {
+                    let place = match self.settings.start {
+                        Some(_) => "in the start posture",
+                        None => "in the middle of its range",
+                    };
+                    (middle(), place.into())
+                });
+            self.info.sample(&x, &mut motion);
+            match path.broken(self.info, &x, &motion) {
+                nothing if nothing.is_empty() => nothing,
+                broken => format!("at rest {place} {broken}"),
+            }
+        });
         match broken.is_empty() {
             false => format!(
-                "{}: no feasible trajectory: at rest {} {broken}; check masses, gravity, the limits and what \
+                "{name}: no feasible trajectory: {broken}; check masses, gravity, the limits and what \
                  stands around, or choose {} start posture",
-                self.plant.name(),
                 match self.settings.start {
-                    Some(_) => "in the start posture",
-                    None => "in the middle of its range",
-                },
-                if self.settings.start.is_some() {
-                    "another"
-                } else {
-                    "a"
-                },
+                    Some(_) => "another",
+                    None => "a",
+                }
             ),
             true => format!(
-                "{}: no trajectory that keeps the limits was found to excite every parameter; \
+                "{name}: no trajectory that keeps the limits was found to excite every parameter; \
                  check masses, inertias, the limits and the start posture",
-                self.plant.name()
             ),
         }
     }

@@ -15,7 +15,7 @@ use super::information::Evaluation;
 use super::limits::ExtremaWork;
 use super::path::PathMemory;
 use super::solve::Task;
-use crate::conic::{Problem, Settings as ConicSettings};
+use crate::conic::Problem;
 use crate::error::Result;
 
 /// Most linearisations.
@@ -72,7 +72,7 @@ pub fn restore(
                 row.slack,
             );
         }
-        let solution = p.solve(&ConicSettings::fast())?;
+        let solution = p.solve(&task.conic())?;
         if !solution.status.is_solved() {
             return Ok(None);
         }

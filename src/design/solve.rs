@@ -186,6 +186,16 @@ impl Iterate {
 }
 
 impl Task<'_> {
+    /// Settings of a conic solve, which ends at the deadline.
+    pub(super) fn conic(&self) -> ConicSettings {
+        let mut settings = ConicSettings::fast();
+        if let Some(deadline) = self.deadline {
+            let left = deadline.saturating_duration_since(Instant::now());
+            settings.time_limit = left.as_secs_f64().max(1e-3);
+        }
+        settings
+    }
+
     /// Free numbers a joint.
     fn free(&self) -> usize {
         self.info.len() / self.scale.len()
@@ -295,12 +305,7 @@ impl State {
         let mut path_rows = here.path_rows.clone();
         for round in 1.. {
             self.fill(task, here, hessian, damping, (&rows, &path_rows));
-            let mut settings = ConicSettings::fast();
-            if let Some(deadline) = task.deadline {
-                let left = deadline.saturating_duration_since(Instant::now());
-                settings.time_limit = left.as_secs_f64().max(1e-3);
-            }
-            let solution = self.problem.solve(&settings)?;
+            let solution = self.problem.solve(&task.conic())?;
             if !solution.status.is_solved() {
                 return Ok(None);
             }

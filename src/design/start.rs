@@ -11,6 +11,7 @@ use crate::robot::{Motion, Robot};
 use crate::trajectory::Basis;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 /// Size of a unit step of each joint in `x`: the amplitude that the position range or the
 /// velocity limit allows at the base frequency, whichever is less.
@@ -49,7 +50,69 @@ pub struct Source<'a> {
     pub seed: u64,
     /// the first feasible start and the first phase will do
     pub rough: bool,
+    /// postures to move about, the more spacious ones first; see [`holding`]
+    pub postures: Vec<Vec<f64>>,
 }
+
+/// Free numbers of a motion that stands still in a posture.
+pub fn standing(basis: &Basis, posture: &[f64]) -> Vec<f64> {
+    let h = basis.harmonics.len();
+    let each = posture.iter().enumerate();
+    each.flat_map(|(j, &q)| basis.parameters(j, &constant(q, h)).as_slice().to_vec())
+        .collect()
+}
+
+/// Of the postures that the limits along the path know, moved inside the limits of the joints: those in which all limits hold at
+/// rest, so that the drives bear the robot there, too. All of them where there is none; none where the start is prescribed.
+pub fn holding(task: &Task, basis: &Basis) -> Vec<Vec<f64>> {
+    let Some(limits) = task.path.filter(|_| basis.start.is_none()) else {
+        return Vec::new();
+    };
+    let inside = |work: &mut ExtremaWork, posture: &[f64]| -> Vec<f64> {
+        let each = posture.iter().enumerate();
+        each.map(|(j, &q)| {
+            let still = basis.parameters(j, &constant(q, basis.harmonics.len()));
+            let used = task.limits.gauge(j, still.as_slice(), work) / INSIDE;
+            let rest = task.limits.rest(j);
+            rest + (q - rest) / used.max(1.0)
+        })
+        .collect()
+    };
+    type Memory = (Samples, PathMemory, ExtremaWork);
+    let looked_at = |memory: &mut Memory, posture: &Vec<f64>| {
+        let posture = inside(&mut memory.2, posture);
+        let still = standing(basis, &posture);
+        task.info.sample(&still, &mut memory.0);
+        let used = limits.used(task.info, &still, &memory.0, &mut memory.1);
+        (used <= 1.0, posture)
+    };
+    let (mut kept, mut other) = (Vec::new(), Vec::new());
+    for some in limits.postures().chunks(KEPT) {
+        let found: Vec<(bool, Vec<f64>)> = some
+            .par_iter()
+            .map_init(Memory::default, looked_at)
+            .collect();
+        for (holds, posture) in found {
+            match holds {
+                true => kept.push(posture),
+                false => other.push(posture),
+            }
+        }
+        if kept.len() >= KEPT {
+            break;
+        }
+    }
+    if kept.is_empty() {
+        kept = other;
+    }
+    kept.truncate(KEPT);
+    kept
+}
+
+/// Postures to move about that are kept.
+const KEPT: usize = 400;
+/// A posture uses no more than this of the limits of a joint, so that it can move there.
+const INSIDE: f64 = 0.98;
 
 /// Coefficients of a joint that stands still.
 fn constant(position: f64, harmonics: usize) -> Vec<f64> {
@@ -190,10 +253,9 @@ impl Source<'_> {
     }
 
     /// A posture to move about, where the limits along the path know some; the more spacious ones more often.
-    /// None where the start is prescribed.
     fn centre(&self, rng: &mut ChaCha8Rng) -> Option<&[f64]> {
-        let free = self.task.path.map(|p| p.postures()).unwrap_or_default();
-        if free.is_empty() || self.basis.start.is_some() {
+        let free = &self.postures;
+        if free.is_empty() {
             return None;
         }
         let at = rng.random_range(0.0..1.0_f64).powi(2) * free.len() as f64;

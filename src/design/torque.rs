@@ -7,7 +7,7 @@
 use super::information::{Evaluation, Information};
 use super::path::{PathLimits, PathMemory, PathRow, ROOM};
 use crate::dynamics::{Derivatives, Samples, Workspace};
-use crate::robot::{JointTerm, Motion, Robot};
+use crate::robot::{JointTerm, Motion, Robot, plain};
 
 /// Torque limits of a robot.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ fn remedy(robot: &Robot, j: usize, derate: f64) -> String {
     if coulomb > 0.0 {
         text = format!(
             " (friction {} {unit}{}, limit {} {unit} times derate {derate})",
-            short(coulomb),
+            plain(coulomb),
             match followers.is_empty() {
                 true => String::new(),
                 false => format!(
@@ -49,35 +49,13 @@ fn remedy(robot: &Robot, j: usize, derate: f64) -> String {
                     followers[0]
                 ),
             },
-            short(joint.limits.effort)
+            plain(joint.limits.effort)
         );
     }
-    let [low, high] = joint.limits.position;
-    let middle = 0.5 * (low + high);
-    let hold = if middle.is_finite() { middle } else { 0.0 };
     text + &format!(
-        "; correct the effort limit or <dynamics friction>, or hold the joint: write \
-         `lock = {{ {} = {} }}` at the top of robot.toml",
-        toml_key(&joint.name),
-        short(hold)
+        "; correct the effort limit or <dynamics friction>, or hold the joint: write `{}` at the top of robot.toml",
+        joint.lock_line()
     )
-}
-
-/// A number that people read and TOML takes.
-fn short(x: f64) -> String {
-    match x == 0.0 || (1e-3..1e6).contains(&x.abs()) {
-        true => format!("{}", (1e4 * x).round() / 1e4),
-        false => format!("{x:.2e}"),
-    }
-}
-
-/// A name as a key of TOML: bare where it can be.
-fn toml_key(name: &str) -> String {
-    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    match !name.is_empty() && name.chars().all(bare) {
-        true => name.to_string(),
-        false => format!("{name:?}"),
-    }
 }
 
 /// Room kept at the samples for what happens between them, as a fraction of the limit.
@@ -205,7 +183,7 @@ impl PathLimits for TorqueLimits {
             ),
             true => format!(
                 "{name} already needs {} % of its effort limit{remedy}",
-                short(100.0 * used)
+                plain(100.0 * used)
             ),
             false => String::new(),
         }

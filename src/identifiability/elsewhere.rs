@@ -1,5 +1,6 @@
 //! How well the model will know torques that the motion did not visit.
 
+use super::json::INFINITE;
 use crate::base::BaseParameters;
 use crate::error::Result;
 use crate::plant::Plant;
@@ -36,7 +37,11 @@ impl TorqueUncertainty {
         let count = states.count.max(1);
         let mean = |j: usize, of: &dyn Fn(usize) -> f64| {
             let sum: f64 = (j * count..(j + 1) * count).map(of).sum();
-            (sum / count as f64).max(0.0).sqrt().min(1e300)
+            // from a covariance that does not exist: nothing is known
+            match sum.is_nan() {
+                true => INFINITE,
+                false => (sum / count as f64).max(0.0).sqrt().min(INFINITE),
+            }
         };
         let variance = |i: usize| -> f64 {
             let each = (0..rows.ncols()).map(|k| spread[(i, k)] * rows[(i, k)]);

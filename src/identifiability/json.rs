@@ -11,7 +11,8 @@ use crate::trajectory::{Proof, SampledBound, Space};
 use serde_json::{Map, Value, json};
 
 /// What stands for infinity: JSON has none.
-const INFINITE: f64 = 1e300;
+#[doc(hidden)]
+pub const INFINITE: f64 = 1e300;
 
 /// A number that JSON can hold: infinities become ±1e300, and what is not a number, being an
 /// uncertainty or a ratio that could not be had, 1e300.

@@ -36,6 +36,7 @@ pub(crate) use numbers::{ConditionNumbers, Prediction};
 pub(crate) use platform::Platform;
 pub(crate) use spread::Spread;
 
+use self::json::INFINITE;
 use crate::base::BaseParameters;
 use crate::design::{Condition, Question, Settings};
 use crate::dynamics::Samples;
@@ -212,11 +213,16 @@ pub fn assess(plant: &Plant, trajectory: Option<&Trajectory>) -> Result<Assessme
     };
     let unit_columns = all.unit_columns();
     all.warnings.extend(unexcited(&condition, unit_columns));
-    all.warnings.extend(hardly_moved::warning(
-        &certified.actuators,
-        &plant.actuators(),
-    ));
     let torque = plant.nominal_torque(&motion)?;
+    let (actuated, lock) = (plant.actuators(), platform.is_none());
+    all.warnings
+        .extend(hardly_moved::warning(&certified.actuators, &actuated, lock));
+    all.warnings.extend(hardly_moved::lost_in_noise(
+        &torque,
+        &all.torque_noise,
+        &actuated,
+        lock,
+    ));
     let actuators = plant.actuator_motion(&motion)?;
     let view = page::view::fill(
         plant,
@@ -272,6 +278,14 @@ fn alone(plant: &Plant) -> Result<Assessment> {
     })
 }
 
+/// A number of any size with two digits.
+fn scale(x: f64) -> String {
+    match x >= INFINITE {
+        true => "infinite".into(),
+        false => format!("{x:.1e}"),
+    }
+}
+
 /// A warning where the motion leaves base parameters out, by the condition number that stands for all.
 fn unexcited(condition: &ConditionNumbers, unit_columns: bool) -> Option<Warning> {
     let (number, most, how) = match unit_columns {
@@ -283,7 +297,7 @@ fn unexcited(condition: &ConditionNumbers, unit_columns: bool) -> Option<Warning
         Warning::new(
             WarningKind::NotExcited,
             "trajectory",
-            format!("{message}{how} is {number:.1e}"),
+            format!("{message}{how} is {}", scale(number)),
         )
     })
 }
@@ -337,9 +351,9 @@ fn singular_values(m: MatRef<'_, f64>) -> Result<Vec<f64>> {
 
 fn ratio(s: &[f64]) -> f64 {
     match (s.first(), s.last()) {
-        (Some(a), Some(b)) if *b > 0.0 => (a / b).min(1e300),
+        (Some(a), Some(b)) if *b > 0.0 => (a / b).min(INFINITE),
         (None, _) => 1.0,
-        _ => 1e300,
+        _ => INFINITE,
     }
 }
 
@@ -362,14 +376,15 @@ fn predict(values: &[f64], base: &BaseParameters, covariance: &Mat<f64>) -> Vec<
     let b = base.count();
     let mut all: Vec<Prediction> = (0..b)
         .map(|a| {
-            let std = covariance[(a, a)].sqrt().min(1e300);
+            let std = covariance[(a, a)].sqrt().min(INFINITE);
             Prediction {
                 parameter: base.name(a).to_string(),
                 combination: base.combination(a),
                 unit: base.units[base.kept[a]].to_string(),
                 nominal: nominal[a],
                 std,
-                percent: (nominal[a] != 0.0).then(|| (100.0 * std / nominal[a].abs()).min(1e300)),
+                percent: (nominal[a] != 0.0)
+                    .then(|| (100.0 * std / nominal[a].abs()).min(INFINITE)),
             }
         })
         .collect();

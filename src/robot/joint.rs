@@ -211,6 +211,14 @@ impl Joint {
         }
     }
 
+    /// The line of robot.toml that holds it, in the middle of its range.
+    pub(crate) fn lock_line(&self) -> String {
+        let [low, high] = self.limits.position;
+        let middle = 0.5 * (low + high);
+        let hold = if middle.is_finite() { middle } else { 0.0 };
+        format!("lock = {{ {} = {} }}", toml_key(&self.name), plain(hold))
+    }
+
     /// The most that dry friction takes, whatever the speed: Coulomb and breakaway, N m or N.
     pub fn dry(&self) -> f64 {
         self.terms[JointTerm::Coulomb as usize].abs() + self.stribeck.force.abs()
@@ -226,4 +234,20 @@ pub enum Prior {
     Cad,
     /// from an earlier identification, close
     Identified,
+}
+/// A number that people read and TOML takes.
+pub(crate) fn plain(x: f64) -> String {
+    match x == 0.0 || (1e-3..1e6).contains(&x.abs()) {
+        true => format!("{}", (1e4 * x).round() / 1e4),
+        false => format!("{x:.2e}"),
+    }
+}
+
+/// A name as a key of TOML: bare where it can be.
+fn toml_key(name: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match !name.is_empty() && name.chars().all(bare) {
+        true => name.to_string(),
+        false => format!("{name:?}"),
+    }
 }

@@ -27,7 +27,7 @@ pub(crate) mod xacro;
 pub use file::holds_robot;
 pub use inertia::Inertia;
 pub use joint::Joint;
-pub(crate) use joint::{JointTerm, Limits, Motion, Prior};
+pub(crate) use joint::{JointTerm, Limits, Motion, Prior, plain};
 #[doc(hidden)]
 pub use meant::Placement;
 pub(crate) use parameter::{Column, Parameter};

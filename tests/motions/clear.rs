@@ -214,6 +214,40 @@ fn tip(fourier: &Fourier, t: f64) -> Vector3<f64> {
     )
 }
 
+/// Three links of which the drives bear the weight near the vertical only, in few of the postures that touch nothing.
+#[test]
+fn starts_are_postures_that_the_drives_can_hold() {
+    let mut joints = String::new();
+    for (name, parent, child, at, effort) in [
+        ("one", "column", "first", "0 0 0.4", 5.0),
+        ("two", "first", "second", "0.4 0 0", 2.5),
+        ("three", "second", "third", "0.4 0 0", 0.8),
+    ] {
+        joints += &format!(
+            r#"<link name="{child}">{INERTIA}{BOX}</link><joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
+<origin xyz="{at}"/><axis xyz="0 -1 0"/><limit lower="-3" upper="3" velocity="3" effort="{effort}"/></joint>"#
+        );
+    }
+    let urdf = format!(
+        r#"<robot name="weak"><link name="column"><collision><origin xyz="0 0 0.15"/><geometry><box size="0.2 0.2 0.3"/></geometry></collision></link>{joints}</robot>"#
+    );
+    let limits = ["one", "two", "three"].map(|name| {
+        format!(
+            "[[joint]]\nname = \"{name}\"\nacceleration = 15.0\njerk = 1500.0\ntorque_noise = 0.1\n"
+        )
+    });
+    let toml = format!("name = \"weak\"\nurdf = \"weak.urdf\"\n{}", limits.concat());
+    let plant: Plant = Robot::from_toml_str(&toml, &urdf, "robot.toml")
+        .unwrap()
+        .into();
+    for seed in [1, 3] {
+        let settings = settings().with(|set| set.seed = seed);
+        let d = design(&plant, &settings).unwrap();
+        kept(&d, 2000.0);
+        assert_eq!(d.record.starts.len(), 2, "both starts were found");
+    }
+}
+
 #[test]
 fn an_obstacle_in_the_way_changes_the_design() {
     let free = design(&arm(""), &settings()).unwrap().trajectory.fourier;

@@ -9,4 +9,5 @@ mod controller_limits;
 mod design;
 mod moves;
 mod rates_and_tool;
+mod said;
 mod trajectory;

@@ -1,5 +1,6 @@
 //! Volumes of links, where they come from, and the pairs of them that are looked at.
 
+mod mended;
 mod meshes;
 mod pairs;
 mod stated;
