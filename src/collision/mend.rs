@@ -117,8 +117,9 @@ fn apart(scene: &Scene, robot: &Robot, balls: &Balls, from: &[f64], never: &[boo
             let need = 1.2 * (ROOM - room) + 1e-4;
             for (j, q) in q.iter_mut().enumerate() {
                 let most = STEP * width(ranges[j]);
-                let step = (scaled(j) * need / size).clamp(-most, most);
-                *q = (*q + step).clamp(ranges[j][0], ranges[j][1]);
+                let step = (scaled(j) * need / size).max(-most).min(most);
+                // no clamp: that panics where limits leave no range
+                *q = (*q + step).max(ranges[j][0]).min(ranges[j][1]);
             }
         }
         if missing < best.missing {
