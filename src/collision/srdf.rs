@@ -1,6 +1,7 @@
 //! Pairs that an SRDF file disables: `<disable_collisions link1="…" link2="…" reason="…"/>`.
 
 use crate::error::{Error, Result};
+use crate::robot::xml_error::malformed;
 use std::path::Path;
 
 /// Largest file that is read, bytes.
@@ -18,8 +19,10 @@ pub(super) fn disabled(path: &Path) -> Result<Vec<[String; 2]>> {
         return Err(Error::file(path, "", "larger than 64 MiB: this is no SRDF"));
     }
     let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-    let document = roxmltree::Document::parse(&text)
-        .map_err(|e| Error::file(path, "", format!("malformed XML: {e}")))?;
+    let document = roxmltree::Document::parse(&text).map_err(|e| {
+        let (place, said) = malformed(&text, &e);
+        Error::file(path, place, said)
+    })?;
     let root = document.root_element();
     if root.tag_name().name() != "robot" {
         let tag = root.tag_name().name();

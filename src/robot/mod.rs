@@ -22,6 +22,7 @@ pub(crate) mod tool;
 pub(crate) mod urdf;
 mod velocity_by_position;
 pub(crate) mod xacro;
+pub(crate) mod xml_error;
 
 #[doc(hidden)]
 pub use file::holds_robot;

@@ -1,6 +1,7 @@
 //! The elements of an MJCF with its includes in their place, and what stands in their attributes.
 
 use crate::error::{Error, Result};
+use crate::robot::xml_error::malformed;
 use nalgebra::Vector3;
 use roxmltree::Document;
 use std::collections::HashMap;
@@ -142,14 +143,8 @@ impl Parser {
     fn one(&mut self, text: &str, file: &Path, depth: usize) -> Result<Node> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let document = Document::parse(text).map_err(|e| {
-            let place = format!("line {}", e.pos().row);
-            let said = e.to_string();
-            let said = said.split(" at ").next().unwrap_or_default().to_string();
-            Error::file(
-                file,
-                place,
-                format!("malformed XML: {said}; correct the file"),
-            )
+            let (place, said) = malformed(text, &e);
+            Error::file(file, place, format!("{said}; correct the file"))
         })?;
         let mut includes = Vec::new();
         let root = document.root_element();

@@ -5,6 +5,7 @@ use super::inertial::inertial_parameters;
 use super::source::{Source, child, shorten};
 use super::{ByPosition, Kind, Limit, Link, Mimic, Urdf, UrdfJoint};
 use crate::error::{Error, Result, Warning, WarningKind};
+use crate::robot::xml_error::malformed;
 use crate::robot::{Placement, meant};
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
@@ -109,6 +110,7 @@ pub(super) fn read(text: &str, file: &Path) -> Result<Urdf> {
 /// Malformed XML, with the line and a remedy for the common causes.
 fn xml_error(text: &str, file: &Path, error: &roxmltree::Error) -> Error {
     use roxmltree::Error as Xml;
+    let (place, said) = malformed(text, error);
     let message = match error {
         Xml::UnknownNamespace(prefix, _) if prefix == "xacro" => {
             "it uses xacro, and <robot> does not declare it; add \
@@ -119,17 +121,12 @@ fn xml_error(text: &str, file: &Path, error: &roxmltree::Error) -> Error {
             "this is not XML; a URDF begins with <robot name=…>".to_string()
         }
         Xml::DtdDetected => "document type definitions are not read; remove <!DOCTYPE>".to_string(),
-        _ => {
-            let said = error.to_string();
-            let said = said.split(" at ").next().unwrap_or_default().to_string();
-            format!("malformed XML: {said}; correct the file or export it again")
-        }
+        _ => format!("{said}; correct the file or export it again"),
     };
-    let row = match error {
-        Xml::NoRootNode | Xml::UnclosedRootNode | Xml::DtdDetected => None,
-        _ => Some(error.pos().row),
+    let place = match error {
+        Xml::DtdDetected => String::new(),
+        _ => place,
     };
-    let place = row.map_or(String::new(), |row| format!("line {row}"));
     Error::file(file, place, message)
 }
 

@@ -37,7 +37,11 @@ fn urdf_errors_say_where_and_what_to_do() {
             "<robot name=\"r\"><link name=\"a\"/></robot>".into(),
             &["no joint moves", "revolute"],
         ),
-        (replaced("</robot>", ""), &["malformed XML"]),
+        (replaced("</robot>", ""), &["malformed XML", "breaks off"]),
+        (
+            "<robot name=\"r\">\n<link name=\"a\"/>\n<link name=\"b\"".into(),
+            &["line 3", "malformed XML", "breaks off"],
+        ),
         (
             replaced("<link name=\"upper\">", "<link name=upper>"),
             &["line 4", "malformed XML"],
