@@ -33,18 +33,22 @@ pub const FLOOR: &str = "floor";
 /// # Errors
 /// An SRDF that cannot be read; no posture without contact: the pairs that are in the way.
 pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
-    let mut found = with_volumes(robot, postures, false);
+    let Some((mut scene, mut rooms)) = with_volumes(robot, postures)? else {
+        return Ok(None);
+    };
+    if postures.is_empty() {
+        return Ok(Some(scene));
+    }
     let mut robot = robot.clone();
     for most in FINER {
-        let hard: Vec<usize> = match &found {
-            Ok(None) => break,
-            Ok(Some(scene)) => {
+        let hard: Vec<usize> = match scene.free.is_empty() {
+            false => {
                 let named = scene.always_near.iter().flatten();
                 named.filter_map(|n| robot.geometry.link(n)).collect()
             }
             // what is in the way is told soon
-            Err(_) if most > FINER[0] => break,
-            Err(_) => (0..robot.geometry.links.len()).collect(),
+            true if most > FINER[0] => break,
+            true => (0..robot.geometry.links.len()).collect(),
         };
         let fitted = &robot.geometry.volumes().links;
         let fitted = fitted.iter().filter(|v| v.origin == Origin::Fitted);
@@ -56,22 +60,19 @@ pub fn scene(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<Scene>> {
             break;
         }
         robot.geometry = robot.geometry.finer(&hard, most);
-        found = with_volumes(&robot, postures, false);
+        match with_volumes(&robot, postures)? {
+            Some(finer) => (scene, rooms) = finer,
+            None => return Ok(None),
+        }
     }
-    let few = match &found {
-        Ok(None) => false,
-        Ok(Some(scene)) => !postures.is_empty() && scene.free.len() < ENOUGH,
-        Err(_) => true,
-    };
-    if few {
-        found = with_volumes(&robot, postures, true);
+    if scene.free.len() < ENOUGH {
+        scene.mend(&robot, postures, &rooms)?;
     }
-    found
+    Ok(Some(scene))
 }
 
-/// The scene with the volumes that the robot's geometry has. Where few postures are free of contact and `mend` is set, links are
-/// moved apart in others.
-fn with_volumes(robot: &Robot, postures: &[Vec<f64>], mend: bool) -> Result<Option<Scene>> {
+/// The scene with the volumes that the robot's geometry has, and what [`Scene::sample`] finds in it.
+fn with_volumes(robot: &Robot, postures: &[Vec<f64>]) -> Result<Option<(Scene, Vec<Vec<f64>>)>> {
     let geometry = &robot.geometry;
     if geometry.is_empty() || geometry.check == Some(false) {
         return Ok(None);
@@ -106,8 +107,8 @@ fn with_volumes(robot: &Robot, postures: &[Vec<f64>], mend: bool) -> Result<Opti
     let ignored = ignored(geometry, &mut scene.warnings)?;
     scene.pair_up(robot, &joined, &ignored);
     scene.keep_in(robot);
-    scene.sample(robot, postures, mend)?;
-    Ok(Some(scene))
+    let rooms = scene.sample(robot, postures);
+    Ok(Some((scene, rooms)))
 }
 
 /// Pairs that the robot file and its SRDF name.

@@ -1,6 +1,6 @@
 //! Which pairs of a scene matter: those that can come near and can be kept apart, in many postures.
 
-use super::mend::{ENOUGH, LEAST, Mended, mended};
+use super::mend::{LEAST, Mended, mended};
 use super::scene::{Balls, LeftOut, Pair, Partner, Scene, poses};
 use crate::error::{Error, Result, Warning, WarningKind};
 use crate::robot::Robot;
@@ -24,15 +24,10 @@ const REMEDY: &str = "Check [[obstacle]], `floor` and `margin`, hold joints that
 
 impl Scene {
     /// Looks at the pairs in many postures: leaves out those that no posture keeps apart, and keeps postures
-    /// without contact. Where these are few and `mend` is set, links are moved apart in others.
-    pub(super) fn sample(
-        &mut self,
-        robot: &Robot,
-        postures: &[Vec<f64>],
-        mend: bool,
-    ) -> Result<()> {
+    /// without contact. The room of the other pairs beyond their margin, posture by posture and pair by pair.
+    pub(super) fn sample(&mut self, robot: &Robot, postures: &[Vec<f64>]) -> Vec<Vec<f64>> {
         if postures.is_empty() {
-            return Ok(());
+            return Vec::new();
         }
         let balls = Balls::new(self);
         let mut rooms: Vec<Vec<f64>> = postures
@@ -74,39 +69,38 @@ impl Scene {
             ));
         }
         self.always_near = always;
-        let mut free: Vec<(f64, Vec<f64>)> = (rooms.iter().zip(postures))
-            .map(|(r, q)| (least(r, &never), q))
-            .filter(|(room, _)| *room >= 0.0)
-            .map(|(room, q)| (room, q.clone()))
-            .collect();
-        if mend && free.len() < ENOUGH {
-            let mut found = mended(self, robot, postures, &rooms, &never);
-            if free.is_empty() && !found.iter().any(Mended::free) {
-                let best = self.narrow(robot, found, &never);
-                let best = best.map_err(|stuck| self.no_room(robot, &rooms, &never, &stuck))?;
-                found = mended(self, robot, postures, &rooms, &never);
-                found.push(best);
-            }
-            free.extend(
-                found
-                    .into_iter()
-                    .filter(Mended::free)
-                    .map(|m| (m.room, m.posture)),
-            );
-        }
-        if free.is_empty() {
-            return Err(self.no_room(robot, &rooms, &never, &[]));
-        }
-        // of two with the same room the first one stays first
-        free.sort_by(|a, b| b.0.total_cmp(&a.0));
-        self.free = free.into_iter().map(|(_, q)| q).collect();
+        leave_out(&mut self.pairs, &never);
+        rooms.iter_mut().for_each(|r| leave_out(r, &never));
         let most = |p: usize| rooms.iter().map(|r| r[p]).fold(0.0, f64::max);
-        self.most = (0..self.pairs.len())
-            .filter(|p| !never[*p])
-            .map(most)
-            .collect();
-        let mut never = never.into_iter();
-        self.pairs.retain(|_| !never.next().unwrap_or(false));
+        self.most = (0..self.pairs.len()).map(most).collect();
+        self.free = spacious_first(free(&rooms, postures));
+        rooms
+    }
+
+    /// Where few postures are free of contact, moves links apart in others. `rooms`: what [`Scene::sample`] found.
+    ///
+    /// # Errors
+    /// No posture without contact: the pairs that are in the way.
+    pub(super) fn mend(
+        &mut self,
+        robot: &Robot,
+        postures: &[Vec<f64>],
+        rooms: &[Vec<f64>],
+    ) -> Result<()> {
+        let mut free = free(rooms, postures);
+        let mut found = mended(self, robot, postures, rooms);
+        if free.is_empty() && !found.iter().any(Mended::free) {
+            let best = self.narrow(robot, found);
+            let best = best.map_err(|stuck| self.no_room(robot, rooms, &stuck))?;
+            found = mended(self, robot, postures, rooms);
+            found.push(best);
+        }
+        let apart = found.into_iter().filter(Mended::free);
+        free.extend(apart.map(|m| (m.room, m.posture)));
+        if free.is_empty() {
+            return Err(self.no_room(robot, rooms, &[]));
+        }
+        self.free = spacious_first(free);
         Ok(())
     }
 
@@ -171,7 +165,6 @@ impl Scene {
         &mut self,
         robot: &Robot,
         mended: Vec<Mended>,
-        never: &[bool],
     ) -> std::result::Result<Mended, Vec<String>> {
         let best = mended
             .into_iter()
@@ -182,7 +175,7 @@ impl Scene {
         let mut links: BTreeMap<[String; 2], f64> = BTreeMap::new();
         let mut stuck: Vec<String> = Vec::new();
         for (p, pair) in self.pairs.iter().enumerate() {
-            if never[p] || rooms[p] >= LEAST {
+            if rooms[p] >= LEAST {
                 continue;
             }
             let [a, b] = self.names(pair).map(String::from);
@@ -221,21 +214,14 @@ impl Scene {
         ));
         let rooms = self.rooms(robot, &Balls::new(self), &best.posture);
         Ok(Mended {
-            room: least(&rooms, never),
+            room: least(&rooms),
             ..best
         })
     }
 
     /// Which pairs leave no free posture: those in contact most often, and those that are `stuck` where links were moved apart.
-    fn no_room(
-        &self,
-        robot: &Robot,
-        rooms: &[Vec<f64>],
-        never: &[bool],
-        stuck: &[String],
-    ) -> Error {
+    fn no_room(&self, robot: &Robot, rooms: &[Vec<f64>], stuck: &[String]) -> Error {
         let mut often: Vec<(usize, usize)> = (0..self.pairs.len())
-            .filter(|p| !never[*p])
             .map(|p| (rooms.iter().filter(|r| r[p] < 0.0).count(), p))
             .collect();
         often.sort_by(|a, b| b.cmp(a));
@@ -275,10 +261,29 @@ impl Scene {
     }
 }
 
-/// Least room of the pairs that are looked at.
-fn least(rooms: &[f64], never: &[bool]) -> f64 {
-    let kept = rooms.iter().zip(never).filter(|(_, n)| !**n);
-    kept.map(|(room, _)| *room).fold(f64::INFINITY, f64::min)
+/// Least room of all pairs.
+fn least(rooms: &[f64]) -> f64 {
+    rooms.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// Postures without contact, each with its room.
+fn free(rooms: &[Vec<f64>], postures: &[Vec<f64>]) -> Vec<(f64, Vec<f64>)> {
+    let each = rooms.iter().map(|r| least(r)).zip(postures);
+    each.filter(|(room, _)| *room >= 0.0)
+        .map(|(room, q)| (room, q.clone()))
+        .collect()
+}
+
+/// Postures in the order of their room; of two with the same the first one stays first.
+fn spacious_first(mut free: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+    free.sort_by(|a, b| b.0.total_cmp(&a.0));
+    free.into_iter().map(|(_, q)| q).collect()
+}
+
+/// Drops what is never looked at.
+fn leave_out<T>(all: &mut Vec<T>, never: &[bool]) {
+    let mut never = never.iter();
+    all.retain(|_| !never.next().is_some_and(|n| *n));
 }
 
 /// Pairs of names that are left out, each once.

@@ -8,7 +8,7 @@
 //! Δq_j = s_j² (∂d/∂q_j) (need − d) / Σ_k s_k² (∂d/∂q_k)²
 //! ```
 //!
-//! One pair after the other, clamped to the position limits, until all have room (Kaczmarz' method with bounds).
+//! One pair after the other, clamped to the position limits, until all have room (Kaczmarz's method with bounds).
 
 use super::scene::{Balls, Scene, poses};
 use crate::robot::{Joint, Robot};
@@ -46,19 +46,14 @@ impl Mended {
     }
 }
 
-/// Mended postures in the order of those that they came from, until enough of them are free. `rooms`: of every posture, pair by pair;
-/// `never`: pairs that are not looked at.
+/// Mended postures in the order of those that they came from, until enough of them are free. `rooms`: of every posture, pair by pair.
 pub(super) fn mended(
     scene: &Scene,
     robot: &Robot,
     postures: &[Vec<f64>],
     rooms: &[Vec<f64>],
-    never: &[bool],
 ) -> Vec<Mended> {
-    let contact = |r: &Vec<f64>| -> f64 {
-        let kept = r.iter().zip(never).filter(|(_, n)| !**n);
-        kept.map(|(room, _)| (-room).max(0.0)).sum()
-    };
+    let contact = |r: &Vec<f64>| -> f64 { r.iter().map(|room| (-room).max(0.0)).sum() };
     let mut order: Vec<(f64, usize)> = (rooms.iter().enumerate())
         .map(|(i, r)| (contact(r), i))
         .filter(|(size, _)| *size > 0.0)
@@ -70,7 +65,7 @@ pub(super) fn mended(
     for some in order.chunks(AT_A_TIME) {
         let found: Vec<Mended> = some
             .par_iter()
-            .map(|(_, i)| apart(scene, robot, &balls, &postures[*i], never))
+            .map(|(_, i)| apart(scene, robot, &balls, &postures[*i]))
             .collect();
         out.extend(found);
         if out.iter().filter(|m| m.free()).count() >= ENOUGH {
@@ -81,7 +76,7 @@ pub(super) fn mended(
 }
 
 /// The posture near this one in which least room is missing.
-fn apart(scene: &Scene, robot: &Robot, balls: &Balls, from: &[f64], never: &[bool]) -> Mended {
+fn apart(scene: &Scene, robot: &Robot, balls: &Balls, from: &[f64]) -> Mended {
     let ranges: Vec<[f64; 2]> = robot.joints.iter().map(Joint::range).collect();
     let width = |[low, high]: [f64; 2]| high - low;
     let (mut q, mut at, mut slope) = (from.to_vec(), Vec::new(), vec![0.0; from.len()]);
@@ -93,7 +88,7 @@ fn apart(scene: &Scene, robot: &Robot, balls: &Balls, from: &[f64], never: &[boo
     for _ in 0..ROUNDS {
         poses(robot, &q, &mut at);
         let (mut least, mut missing, here) = (f64::INFINITY, 0.0, q.clone());
-        for (pair, _) in scene.pairs.iter().zip(never).filter(|(_, n)| !**n) {
+        for pair in &scene.pairs {
             let far = balls.lower_bound(pair, &at) - pair.margin;
             if far > ROOM {
                 least = least.min(far);

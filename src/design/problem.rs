@@ -3,13 +3,14 @@
 use super::criterion::{Objective, Targets};
 use super::information::Information;
 use super::limits::Limits;
-use super::path::PathLimits;
+use super::path::{PathLimits, PathMemory};
 use super::record::{Record, Status};
 use super::result::{Control, Design, Progress};
 use super::rounds::{ROUND, Search};
 use super::settings::Settings;
 use super::solve::Task;
 use super::start;
+use crate::dynamics::Samples;
 use crate::error::{Error, Result};
 use crate::plant::Plant;
 use crate::trajectory::{Basis, Fourier, Trajectory};
@@ -193,49 +194,11 @@ impl Problem<'_> {
         }
     }
 
-    /// Why there is no feasible trajectory: what the best posture breaks at rest.
+    /// Why there is no feasible trajectory.
     fn infeasible(&self) -> String {
         let name = self.plant.name();
-        let middle = || -> Vec<f64> {
-            let joints = 0..self.plant.coordinates();
-            joints
-                .flat_map(|j| self.limits.rest_parameters(j))
-                .collect()
-        };
-        let broken = self.path.map_or(String::new(), |path| {
-            let (mut motion, mut memory) = Default::default();
-            let mut use_of = |x: &Vec<f64>| {
-                self.info.sample(x, &mut motion);
-                let used = path.used(self.info, x, &motion, &mut memory);
-                if used.is_nan() { f64::INFINITY } else { used }
-            };
-            let known = match self.settings.start {
-                Some(_) => &[],
-                None => path.postures(),
-            };
-            let (x, place) = (known.iter())
-                .map(|posture| start::standing(self.basis, posture))
-                .map(|x| (use_of(&x), x))
-                .min_by(|a, b| a.0.total_cmp(&b.0))
-                .map(|(_, x)| {
-                    let place = format!("in the best of {} postures free of contact", known.len());
-                    (x, place)
-                })
-                .unwrap_or_else(|| {
-                    let place = match self.settings.start {
-                        Some(_) => "in the start posture",
-                        None => "in the middle of its range",
-                    };
-                    (middle(), place.into())
-                });
-            self.info.sample(&x, &mut motion);
-            match path.broken(self.info, &x, &motion) {
-                nothing if nothing.is_empty() => nothing,
-                broken => format!("at rest {place} {broken}"),
-            }
-        });
-        match broken.is_empty() {
-            false => format!(
+        match self.path.and_then(|path| self.broken_at_rest(path)) {
+            Some(broken) => format!(
                 "{name}: no feasible trajectory: {broken}; check masses, gravity, the limits and what \
                  stands around, or choose {} start posture",
                 match self.settings.start {
@@ -243,11 +206,47 @@ impl Problem<'_> {
                     None => "a",
                 }
             ),
-            true => format!(
+            None => format!(
                 "{name}: no trajectory that keeps the limits was found to excite every parameter; \
                  check masses, inertias, the limits and the start posture",
             ),
         }
+    }
+
+    /// The limit that is broken at rest in the best posture that is known, in words; `None` where none is.
+    fn broken_at_rest(&self, path: &dyn PathLimits) -> Option<String> {
+        let mut motion = Samples::default();
+        let known = path.postures();
+        let (x, place) = match &self.settings.start {
+            None if !known.is_empty() => (
+                self.best(path, known)?,
+                format!("in the best of {} postures free of contact", known.len()),
+            ),
+            start => {
+                let joints = 0..self.plant.coordinates();
+                let place = match start {
+                    Some(_) => "in the start posture",
+                    None => "in the middle of its range",
+                };
+                let rest = joints.flat_map(|j| self.limits.rest_parameters(j));
+                (rest.collect(), place.into())
+            }
+        };
+        self.info.sample(&x, &mut motion);
+        let broken = path.broken(self.info, &x, &motion);
+        (!broken.is_empty()).then(|| format!("at rest {place} {broken}"))
+    }
+
+    /// Of these postures the one that uses least of the limits at rest, as free numbers.
+    fn best(&self, path: &dyn PathLimits, postures: &[Vec<f64>]) -> Option<Vec<f64>> {
+        let (mut motion, mut memory) = (Samples::default(), PathMemory::default());
+        let all = postures.iter().map(|posture| {
+            let x = start::standing(self.basis, posture);
+            self.info.sample(&x, &mut motion);
+            let used = path.used(self.info, &x, &motion, &mut memory);
+            (if used.is_nan() { f64::INFINITY } else { used }, x)
+        });
+        all.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, x)| x)
     }
 }
 

@@ -235,6 +235,7 @@ pub enum Prior {
     /// from an earlier identification, close
     Identified,
 }
+
 /// A number that people read and TOML takes.
 pub(crate) fn plain(x: f64) -> String {
     match x == 0.0 || (1e-3..1e6).contains(&x.abs()) {
